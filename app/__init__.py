@@ -1,0 +1,1 @@
+"""The workbench: segmap in the browser and on the command line."""

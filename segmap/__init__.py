@@ -1,0 +1,1 @@
+"""Segment-based maps from laser scans, without pose information."""
