@@ -164,7 +164,7 @@ def _sentence(error: ValidationError) -> str:
     return f"Parameter {name} cannot be {first.get('input')!r}: {first['msg'].lower()}."
 
 
-_PAPER_LAB = {
+_PAPER_LAB: dict[str, Any] = {
     "max_range": 8.0,
     "split_tolerance": 0.025,
     "min_segment_length": 0.0,

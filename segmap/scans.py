@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from segmap.errors import ScanError
-from segmap.pose import FloatArray, Pose2
+from segmap.pose import FloatArray, IntArray, Pose2
 
 __all__ = ["LaserLog", "LaserScan", "LogProblem"]
 
@@ -62,20 +62,20 @@ class LaserScan:
     @cached_property
     def angles(self) -> FloatArray:
         """Headings of the beams, shape (beams,), radians."""
-        return self.first_angle + self.angle_step * np.arange(len(self.ranges))
+        return self.first_angle + self.angle_step * np.arange(len(self.ranges), dtype=np.float64)
 
     @property
     def all_round(self) -> bool:
         """Whether the last beam's neighbour is the first one."""
         return (len(self.ranges) + 0.5) * abs(self.angle_step) >= ALL_ROUND
 
-    def returns(self, max_range: float | None = None) -> tuple[FloatArray, FloatArray]:
+    def returns(self, max_range: float | None = None) -> tuple[FloatArray, IntArray]:
         """Points of shape (returns, 2), metres, in beam order, and the beam of each.
 
         ``max_range`` drops what is farther away, for a limit below the sensor's own.
         """
         with np.errstate(invalid="ignore"):
-            beams = np.flatnonzero(self.ranges <= (np.inf if max_range is None else max_range))
+            beams: IntArray = np.flatnonzero(self.ranges <= (np.inf if max_range is None else max_range))
         ranges, angles = self.ranges[beams], self.angles[beams]
         return np.stack((ranges * np.cos(angles), ranges * np.sin(angles)), axis=-1), beams
 
