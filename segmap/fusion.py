@@ -1,0 +1,173 @@
+"""Chains -> fused map (Section III-C, Algorithm 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.distance import pdist
+
+from segmap.chains import MatchingChain
+from segmap.parameters import Parameters
+from segmap.pose import FloatArray, IntArray, Pose2
+from segmap.segments import Order, SegmentMap, Source
+
+__all__ = ["Fusion", "Polyline", "fuse", "polyline"]
+
+AGAINST = 1.0 / 3.0
+"""where a larger share of a chain's length runs against the rest, its polyline has no direction"""
+
+
+@dataclass(frozen=True, eq=False)
+class Polyline:
+    """The polyline that replaces a matching chain."""
+
+    vertices: FloatArray
+    """shape (k, 2), metres, directed as most of the chain's length is"""
+    directed: bool
+    insertions: int
+    """n of the last P_n (Algorithm 5, line 8)"""
+    finished: bool
+    """False where the plain variant met its bound before every segment was within fusion_tolerance"""
+
+    @property
+    def edges(self) -> FloatArray:
+        """Shape (k - 1, 4), metres."""
+        return np.concatenate((self.vertices[:-1], self.vertices[1:]), axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Fusion:
+    """S_1,2: what INTEGRATE makes of two maps, in the frame of map 1."""
+
+    map: SegmentMap
+    polylines: tuple[Polyline, ...]
+    """one for each chain"""
+
+    @property
+    def unfinished(self) -> int:
+        """How many polylines met their bound."""
+        return sum(not line.finished for line in self.polylines)
+
+
+def fuse(
+    map_1: SegmentMap, map_2: SegmentMap, T_1_2: Pose2, chains: Sequence[MatchingChain], parameters: Parameters
+) -> Fusion:
+    """Unmatched segments of both maps, then a polyline for each chain (Algorithm 5).
+
+    Unmatched segments stay as they are; each edge of a polyline knows the sources of the segments it
+    stands for, and an edge that stands for none is a connector.
+    """
+    moved_2 = map_2.moved(T_1_2)
+    parts = [_unmatched(map_1, [i for c in chains for i in c.first])]  # line 2
+    parts += [_unmatched(moved_2, [j for c in chains for j in c.second])]
+    polylines = []
+    for chain in chains:
+        members = SegmentMap.joined([map_1.take(chain.first), moved_2.take(chain.second)])
+        polylines.append(polyline(members, parameters))
+        parts.append(_as_map(polylines[-1], members, parameters))  # line 12
+    return Fusion(SegmentMap.joined(parts), tuple(polylines))
+
+
+def _unmatched(segment_map: SegmentMap, matched: list[int]) -> SegmentMap:
+    return segment_map.take(np.setdiff1d(np.arange(len(segment_map)), matched))
+
+
+# --- the polyline of one chain (Algorithm 5, lines 4 to 11) ---------------------------------------
+
+
+def polyline(members: SegmentMap, parameters: Parameters) -> Polyline:
+    """P_0, P_1, ... until every segment of a chain is within ``fusion_tolerance`` of its closest edge.
+
+    ``greedy`` inserts each segment at most once; ``plain`` may insert one again, at most
+    ``fusion_bound`` times the number of segments in all.
+    """
+    vertices, directed = _first_edge(members)
+    segments = members.coordinates
+    waiting = np.ones(len(segments), bool)
+    plain = parameters.fusion_variant == "plain"
+    bound = parameters.fusion_bound * len(segments) if plain else len(segments)
+    insertions = 0
+    while insertions < bound and waiting.any():
+        distances, edges = closest_edges(segments, vertices)
+        s = int(np.argmax(np.where(waiting, distances, -1.0)))
+        if distances[s] <= parameters.fusion_tolerance:
+            break
+        insertions += 1
+        waiting[s] = plain
+        vertices = _inserted(vertices, int(edges[s]), segments[s], parameters.point_distance_tolerance)
+    finished = not plain or bool((closest_edges(segments, vertices)[0] <= parameters.fusion_tolerance).all())
+    return Polyline(vertices, directed, insertions, finished)
+
+
+def _first_edge(members: SegmentMap) -> tuple[FloatArray, bool]:
+    """P_0 between the two farthest extremes, directed as most of the length is; and whether it is directed."""
+    extremes = members.coordinates.reshape(-1, 2)
+    first, second = np.triu_indices(len(extremes), k=1)
+    farthest = int(np.argmax(pdist(extremes)))
+    edge = extremes[[first[farthest], second[farthest]]]
+    along = (members.coordinates[:, 2:] - members.coordinates[:, :2]) @ (edge[1] - edge[0])
+    lengths = members.lengths
+    ahead = lengths[members.directed & (along >= 0.0)].sum()
+    against = lengths[members.directed & (along < 0.0)].sum()
+    either = lengths[~members.directed].sum()
+    directed = bool(min(ahead, against) + either / 2.0 <= AGAINST * lengths.sum())
+    return (edge if ahead >= against else edge[::-1].copy()), directed
+
+
+def closest_edges(segments: FloatArray, vertices: FloatArray) -> tuple[FloatArray, IntArray]:
+    """For each segment (n, 4), the distance to its closest edge of a polyline (k, 2), and that edge.
+
+    The distance from an edge is the larger of the distances of the two extremes.
+    """
+    start, along = vertices[:-1], np.diff(vertices, axis=0)
+    squared = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
+    offset = segments.reshape(-1, 2)[:, None] - start
+    share = np.clip((offset * along).sum(axis=2) / squared, 0.0, 1.0)
+    apart = offset - share[..., None] * along
+    distances = np.hypot(apart[..., 0], apart[..., 1]).reshape(len(segments), 2, -1).max(axis=1)
+    edges = np.argmin(distances, axis=1)
+    return distances[np.arange(len(segments)), edges], edges
+
+
+def _inserted(vertices: FloatArray, edge: int, segment: FloatArray, tolerance: float) -> FloatArray:
+    """The polyline with edge (u, v) replaced by u, a, b, v (line 9), near-coinciding vertices dropped."""
+    u, v = vertices[edge], vertices[edge + 1]
+    a, b = segment[:2], segment[2:]
+    if _distance(u, b) + _distance(a, v) < _distance(u, a) + _distance(b, v):
+        a, b = b, a
+    between: list[FloatArray] = []
+    for point in (a, b):
+        before = between[-1] if between else u
+        if _distance(before, point) >= tolerance and _distance(point, v) >= tolerance:
+            between.append(point)
+    return np.concatenate((vertices[: edge + 1], np.reshape(between, (-1, 2)), vertices[edge + 1 :]))
+
+
+def _distance(p: FloatArray, q: FloatArray) -> float:
+    return float(np.hypot(p[0] - q[0], p[1] - q[1]))
+
+
+# --- where the edges come from --------------------------------------------------------------------
+
+
+def _as_map(line: Polyline, members: SegmentMap, parameters: Parameters) -> SegmentMap:
+    """The edges of a polyline as a map."""
+    edges = line.edges
+    owners = _stands_for(edges, members.coordinates, line.vertices, parameters.fusion_tolerance)
+    sources = tuple(_united(members, np.flatnonzero(column)) for column in owners.T)
+    return SegmentMap(edges, Order.NONE, np.full(len(edges), line.directed), sources)
+
+
+def _stands_for(edges: FloatArray, segments: FloatArray, vertices: FloatArray, tolerance: float) -> IntArray:
+    """Whether an edge is a segment's closest one, or has its middle within the tolerance of the segment; (n, k)."""
+    _, closest = closest_edges(segments, vertices)
+    middles = (edges[:, :2] + edges[:, 2:]) / 2.0
+    as_points = np.concatenate((middles, middles), axis=1)
+    near = np.stack([closest_edges(as_points, s.reshape(2, 2))[0] <= tolerance for s in segments])
+    return near | (closest[:, None] == np.arange(len(edges)))
+
+
+def _united(members: SegmentMap, rows: IntArray) -> tuple[Source, ...]:
+    return tuple(sorted({source for row in rows for source in members.sources[row]}))
