@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import overload
+from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,10 +14,39 @@ from numpy.typing import ArrayLike
 from segmap.errors import ScanError
 from segmap.pose import FloatArray, IntArray, Pose2
 
-__all__ = ["LaserLog", "LaserScan", "LogProblem"]
+__all__ = ["LaserLog", "LaserScan", "LogProblem", "ScanId"]
 
 ALL_ROUND = 2.0 * np.pi
 MAX_BEAMS = 100_000
+
+
+class ScanId(NamedTuple):
+    """Which scan of which log, both counted from 0; its text is ``log.scan``.
+
+    >>> str(ScanId(0, 12)), ScanId.parse("0.12").scan
+    ('0.12', 12)
+    """
+
+    log: int
+    scan: int
+
+    def __str__(self) -> str:
+        return f"{self.log}.{self.scan}"
+
+    @classmethod
+    def parse(cls, text: str) -> ScanId:
+        """The scan a text such as ``0.12`` names.
+
+        Raises:
+            ScanError: it names none.
+        """
+        if not _SCAN_ID.fullmatch(text):
+            raise ScanError(f"{text[:80]!r} names no scan: write log.scan, as in 0.12, both counted from 0.")
+        log, scan = text.split(".")
+        return cls(int(log), int(scan))
+
+
+_SCAN_ID = re.compile(r"(0|[1-9][0-9]{0,8})\.(0|[1-9][0-9]{0,8})")
 
 
 @dataclass(frozen=True, eq=False)
