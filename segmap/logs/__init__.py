@@ -1,0 +1,144 @@
+"""Laser logs: a file becomes a :class:`~segmap.scans.LaserLog`, its format found by content, not by name.
+
+To add a format, write a module with a :class:`~segmap.logs.records.Format` and name it in ``FORMATS``.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from itertools import islice
+
+import numpy as np
+
+from segmap.errors import LogError, ScanError
+from segmap.logs.carmen import CARMEN
+from segmap.logs.dpslam import DP_SLAM
+from segmap.logs.no_return import LONGEST, SHORTEST, NoReturn, no_return
+from segmap.logs.records import Format, Problems, Record
+from segmap.logs.source import Limits, LogFile, LogSource, base_name
+from segmap.logs.text import shown
+from segmap.scans import LaserLog, LaserScan
+
+__all__ = ["FORMATS", "Limits", "LogSource", "base_name", "read_log"]
+
+FORMATS: tuple[Format, ...] = (CARMEN, DP_SLAM)
+"""Every format read; the first that recognises a file reads it."""
+
+PACKED = {
+    b"PK\x03\x04": "a zip archive",
+    b"BZh": "compressed with bzip2",
+    b"\xfd7zXZ": "compressed with xz",
+    b"\x28\xb5\x2f\xfd": "compressed with zstd",
+    b"7z\xbc\xaf": "a 7z archive",
+    b"\x1f\x8b": "compressed twice",
+}
+
+
+def read_log(source: LogSource, name: str | None = None, limits: Limits | None = None) -> LaserLog:
+    """Read a laser log from a path, bytes or a binary stream, plain or gzipped.
+
+    Scan i is the i-th laser record that can be read, in file order, from 0. A record that cannot
+    be read is left out and told of in ``problems`` (at most 100, and how many more), and never
+    costs the others; what was read of a damaged or cut off file is kept. A log without scans is
+    a log of length 0 with a problem that says so. ``name`` stands for the file in messages, and
+    its last part names the log; it is never opened.
+
+    Raises:
+        LogError: the file cannot be opened, is of no known format, or grows beyond ``limits``.
+    """
+    problems = Problems()
+    with LogFile(source, name, limits) as file:
+        head = file.head()
+        if not head.strip():
+            return _empty(file, problems)
+        format = _format_of(head, file)
+        records = list(islice(format.records(file, problems), file.limits.scans + 1))
+        if len(records) > file.limits.scans:
+            raise LogError(f"{file.name} holds more than {file.limits.scans} scans: split it and read each part.")
+        if file.damage:
+            problems.add(_last_line(records), _damage(file))
+    scans = _scans(records, silence := _silence(records), problems)
+    if not scans:
+        problems.add(1, f"{file.name} is a {format.name} log without laser scans: choose a log that has some")
+    return LaserLog(file.name, scans, format.name, _main(records, silence), problems.all())
+
+
+def _empty(file: LogFile, problems: Problems) -> LaserLog:
+    if file.damage:
+        raise LogError(f"{file.name} is {file.damage} from its beginning: fetch the file again.")
+    problems.add(1, f"{file.name} is empty: choose a log that holds laser scans")
+    return LaserLog(file.name, (), "", None, problems.all())
+
+
+def _format_of(head: bytes, file: LogFile) -> Format:
+    for format in FORMATS:
+        if format.recognises(head):
+            return format
+    for magic, packed in PACKED.items():
+        if head.startswith(magic):
+            raise LogError(f"{file.name} is {packed}: unpack it and give the log inside.")
+    cut = f", and the file is {file.damage}" if file.damage else ""
+    first = head.split(b"\n", 1)[0].strip()
+    expected = " or ".join(format.expects for format in FORMATS)
+    raise LogError(
+        f"{file.name} is no laser log that segmap reads: line 1 starts with {shown(first)}{cut}."
+        f" Expected {expected}, plain or gzipped."
+    )
+
+
+def _last_line(records: Sequence[Record]) -> int:
+    return records[-1].line if records else 1
+
+
+def _damage(file: LogFile) -> str:
+    return f"the compressed data are {file.damage} after this line; what came before was read: fetch the file again"
+
+
+def _silence(records: Sequence[Record]) -> Mapping[tuple[str, int], NoReturn]:
+    """What stands for "nothing seen", for each laser: the same name and number of beams."""
+    lasers: dict[tuple[str, int], list[Record]] = defaultdict(list)
+    for record in records:
+        lasers[_laser(record)].append(record)
+    return {laser: _silence_of(those) for laser, those in lasers.items()}
+
+
+def _laser(record: Record) -> tuple[str, int]:
+    return record.sensor, len(record.ranges)
+
+
+def _silence_of(records: Sequence[Record]) -> NoReturn:
+    declared = [record.declared_range for record in records if record.declared_range is not None]
+    return no_return([record.ranges for record in records], max(declared, default=None))
+
+
+def _main(records: Sequence[Record], silence: Mapping[tuple[str, int], NoReturn]) -> float | None:
+    """The reading of the laser with most scans."""
+    lasers = Counter(_laser(record) for record in records).most_common(1)
+    return silence[lasers[0][0]].reading if lasers else None
+
+
+def _scans(
+    records: Sequence[Record], silence: Mapping[tuple[str, int], NoReturn], problems: Problems
+) -> tuple[LaserScan, ...]:
+    scans = []
+    for record in records:
+        try:
+            scans.append(_scan(record, silence[_laser(record)].limit))
+        except ScanError as error:
+            problems.add(record.line, f"{error} The record was left out")
+    return tuple(scans)
+
+
+def _scan(record: Record, limit: float) -> LaserScan:
+    with np.errstate(invalid="ignore"):
+        possible = (record.ranges > SHORTEST) & (record.ranges < LONGEST)
+    return LaserScan(
+        np.where(possible, record.ranges, np.nan),
+        record.first_angle,
+        record.angle_step,
+        limit,
+        record.time,
+        record.pose,
+        record.line,
+    )

@@ -1,0 +1,243 @@
+"""Bytes to read: a path, bytes or a stream; gzip taken off; size, ratio and line length bounded.
+
+A compressed file that is cut off or damaged ends early: what came before the damage is still
+read. One that grows beyond all measure is refused.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path, PurePosixPath
+from typing import IO, Any, TypeAlias
+
+from segmap.errors import LogError
+
+__all__ = ["Limits", "LogFile", "LogSource", "base_name"]
+
+LogSource: TypeAlias = str | os.PathLike[str] | bytes | bytearray | memoryview | IO[bytes]
+"""A path, the bytes themselves, or a binary stream (read from where it stands, and not closed)."""
+
+GZIP = b"\x1f\x8b"
+HEAD = 1 << 20
+"""bytes a format may look at to recognise a file"""
+PIECE = 1 << 13
+"""compressed bytes taken at a time: what is lost where the data are damaged"""
+HARMLESS = 1 << 24
+"""decompressed bytes below which the ratio does not matter"""
+MEBIBYTE = 1 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How much of a file is read at most."""
+
+    size: int = 256 * MEBIBYTE
+    """bytes, decompressed"""
+    ratio: float = 200.0
+    """decompressed bytes for each compressed one; laser logs have 3 to 10"""
+    line: int = 2 * MEBIBYTE
+    """bytes of one line"""
+    scans: int = 500_000
+
+
+def base_name(name: str) -> str:
+    """The last part of a path as one printable line; a name is only ever text, never opened.
+
+    >>> base_name("../../etc/run 1.log")
+    'run 1.log'
+    """
+    last = PurePosixPath(name.replace("\\", "/")).name
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in last)[:200] or "log"
+
+
+class LogFile:
+    """An open log: its first bytes, then its lines. Use as a context manager.
+
+    Raises:
+        LogError: the file cannot be opened or read, or it grows beyond a limit.
+    """
+
+    def __init__(self, source: LogSource, name: str | None = None, limits: Limits | None = None) -> None:
+        self.limits = limits or Limits()
+        self.name = base_name(name or _name_of(source))
+        self._stream, self._ours = _opened(source, self.name)
+        self._bytes = _Bounded(self._stream, self.name, self.limits)
+        self._buffer = io.BufferedReader(self._bytes, HEAD)
+
+    def __enter__(self) -> LogFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._ours:
+            self._stream.close()
+
+    @property
+    def damage(self) -> str | None:
+        """What is wrong with the compressed data, known once the end is reached."""
+        return self._bytes.damage
+
+    def head(self) -> bytes:
+        """The first bytes, at most ``HEAD``, without taking them."""
+        return self._buffer.peek(HEAD)
+
+    def lines(self, too_long: Callable[[int, str], None]) -> Iterator[tuple[int, bytes]]:
+        """Number, from 1, and bytes of each line; one that is too long is reported and passed over.
+
+        Of a damaged file the last line is left out: it is cut off anywhere, even within a number.
+        """
+        for number in count(1):
+            line = self._buffer.readline(self.limits.line + 1)
+            if not line or (self.damage and not line.endswith(b"\n")):
+                return
+            if len(line) > self.limits.line:
+                too_long(number, f"the line is longer than {_mebibytes(self.limits.line)} and was left out")
+                self._finish(line)
+                continue
+            yield number, line.removeprefix(b"\xef\xbb\xbf") if number == 1 else line
+
+    def _finish(self, line: bytes) -> None:
+        while line and not line.endswith(b"\n"):
+            line = self._buffer.readline(HEAD)
+
+
+def _name_of(source: LogSource) -> str:
+    if isinstance(source, str | os.PathLike):
+        return os.fspath(source)
+    name = getattr(source, "name", None)
+    return name if isinstance(name, str) else "log"
+
+
+def _opened(source: LogSource, name: str) -> tuple[IO[bytes], bool]:
+    """The stream, and whether it is ours to close."""
+    if isinstance(source, bytes | bytearray | memoryview):
+        return io.BytesIO(source), True
+    if not isinstance(source, str | os.PathLike):
+        return source, False
+    try:
+        return Path(source).open("rb"), True
+    except FileNotFoundError:
+        raise LogError(f"There is no file {os.fspath(source)}: check the path.") from None
+    except IsADirectoryError:
+        raise LogError(f"{os.fspath(source)} is a folder: give the log file inside it.") from None
+    except (OSError, ValueError) as error:
+        raise _unreadable(name, error) from None
+
+
+def _unreadable(name: str, error: Exception) -> LogError:
+    reason = getattr(error, "strerror", None) or str(error)
+    return LogError(f"{name} cannot be read: {reason.lower()}. Check the file and its permissions.")
+
+
+def _mebibytes(size: int) -> str:
+    return f"{size / MEBIBYTE:g} MiB" if size >= MEBIBYTE else f"{size} bytes"
+
+
+class _Bounded(io.RawIOBase):
+    """The decompressed bytes of a stream, up to the limits."""
+
+    def __init__(self, stream: IO[bytes], name: str, limits: Limits) -> None:
+        self._name, self._limits = name, limits
+        self._compressed = _Compressed(stream, name)
+        start = self._compressed.take(len(GZIP))
+        self._inflated = _Inflated(self._compressed, start) if start == GZIP else None
+        self._start = b"" if self._inflated else start
+        self._size = 0
+
+    @property
+    def damage(self) -> str | None:
+        return self._inflated.damage if self._inflated else None
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        view, filled = memoryview(buffer).cast("B"), 0
+        while filled < len(view) and (piece := self._piece(len(view) - filled)):
+            view[filled : filled + len(piece)] = piece
+            filled += len(piece)
+        return filled
+
+    def _piece(self, size: int) -> bytes:
+        if self._inflated:
+            piece = self._inflated.take(size)
+        elif self._start:
+            piece, self._start = self._start[:size], self._start[size:]
+        else:
+            piece = self._compressed.take(size)
+        self._check(len(piece))
+        return piece
+
+    def _check(self, more: int) -> None:
+        self._size += more
+        if self._size > self._limits.size:
+            size = _mebibytes(self._limits.size)
+            raise LogError(f"{self._name} holds more than {size}: split it into several logs and read each.")
+        ratio = self._size / max(self._compressed.taken, 1) if self._inflated else 0.0
+        if self._size > HARMLESS and ratio > self._limits.ratio:
+            raise LogError(
+                f"{self._name} grows {math.floor(ratio)} times when decompressed, more than any laser log does:"
+                " it was not read. Decompress it yourself if you trust it."
+            )
+
+
+class _Compressed:
+    """The bytes as they lie in the file, counted."""
+
+    def __init__(self, stream: IO[bytes], name: str) -> None:
+        self._stream, self._name = stream, name
+        self.taken = 0
+
+    def take(self, size: int) -> bytes:
+        """Some of the next bytes, at most ``size``; none at the end."""
+        try:
+            piece = self._stream.read(size) or b""
+        except (OSError, ValueError) as error:
+            raise _unreadable(self._name, error) from None
+        self.taken += len(piece)
+        return piece
+
+
+class _Inflated:
+    """gzip data, of one member or several, decompressed piece by piece."""
+
+    def __init__(self, compressed: _Compressed, start: bytes) -> None:
+        self._compressed, self._waiting = compressed, start
+        self._inflate = _inflater()
+        self.damage: str | None = None
+
+    def take(self, size: int) -> bytes:
+        """Some of the next decompressed bytes, at most ``size``; none at the end or at damage."""
+        while not self.damage:
+            if self._inflate.eof and not self._next_member():
+                break
+            data = self._waiting or self._compressed.take(PIECE)
+            try:
+                piece = self._inflate.decompress(data, size)
+            except zlib.error:
+                self.damage = "damaged"
+                break
+            self._waiting = self._inflate.unconsumed_tail
+            if piece:
+                return piece
+            if not data and not self._inflate.eof:
+                self.damage = "cut off"
+        return b""
+
+    def _next_member(self) -> bool:
+        rest = self._inflate.unused_data.lstrip(b"\0")
+        while len(rest) < len(GZIP) and (more := self._compressed.take(PIECE)):
+            rest = (rest + more).lstrip(b"\0")
+        if not rest.startswith(GZIP):
+            return False
+        self._waiting, self._inflate = rest, _inflater()
+        return True
+
+
+def _inflater() -> Any:
+    return zlib.decompressobj(wbits=16 + zlib.MAX_WBITS)
