@@ -9,7 +9,7 @@ differences.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,6 +73,16 @@ class Candidates:
     def take(self, rows: IntArray) -> Candidates:
         """Some of the candidates."""
         return Candidates(self.poses[rows], self.angles_1[rows], self.angles_2[rows], self.draws)
+
+    @classmethod
+    def joined(cls, blocks: Sequence[Candidates]) -> Candidates:
+        """Blocks of candidates in a row."""
+        return cls(
+            np.concatenate([np.empty((0, 3)), *(block.poses for block in blocks)]),
+            np.concatenate([np.empty((0, 2), np.int64), *(block.angles_1 for block in blocks)]),
+            np.concatenate([np.empty((0, 2), np.int64), *(block.angles_2 for block in blocks)]),
+            sum(block.draws for block in blocks),
+        )
 
 
 # --- which segments form an angle -----------------------------------------------------------------
