@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
+from segmap.logs import read_log
 from segmap.pose import Pose2
 from segmap.simulate import (
     INDEX,
@@ -222,3 +223,14 @@ def _points(ranges: np.ndarray, pose: Pose2) -> np.ndarray:
     seen = ranges < Laser().no_return
     angles = Laser().angles[seen]
     return pose @ (ranges[seen, None] * np.stack((np.cos(angles), np.sin(angles)), axis=-1))
+
+
+def test_the_reader_reads_what_the_simulator_wrote(sessions: dict[str, Session]) -> None:
+    """Ranges, angles and the no-return reading of every scan come back from the committed logs."""
+    for name, session in sessions.items():
+        log = read_log(COMMITTED / name)
+        assert (log.format, log.no_return, log.problems) == ("CARMEN", Laser().no_return, ())
+        assert len(log) == len(session.ranges)
+        for scan, ranges in zip(log, session.ranges, strict=True):
+            np.testing.assert_allclose(scan.ranges, np.where(ranges < Laser().no_return, ranges, np.nan), atol=1e-9)
+            np.testing.assert_allclose(scan.angles, Laser().angles, atol=1e-12)
