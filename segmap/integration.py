@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -85,6 +85,13 @@ class Match:
     def value(self) -> float:
         """Value of the best candidate, metres; 0 where there is none."""
         return self.ranked[0].value if self.ranked else 0.0
+
+    def judged(self, value_threshold: float) -> Match:
+        """The same match, with its verdict by another threshold, in metres; nothing is searched again."""
+        if not self.ranked:
+            return self
+        verdict, reasons = _judgement(self.value, value_threshold)
+        return replace(self, verdict=verdict, reasons=reasons)
 
     def to_json(self) -> str:
         """This match as one JSON document."""
@@ -217,7 +224,10 @@ def _verdict(
     """Valid only above the threshold (IV-B, V-B); otherwise the nearest criterion that failed."""
     if not ranked:
         return Verdict.REJECTED, (_why_none(values, maps),)
-    value, threshold = ranked[0].value, parameters.value_threshold
+    return _judgement(ranked[0].value, parameters.value_threshold)
+
+
+def _judgement(value: float, threshold: float) -> tuple[Verdict, tuple[str, ...]]:
     if value > threshold:
         return Verdict.ACCEPTED, (f"The value, {value:.2f} m, is above the threshold of {threshold:.2f} m.",)
     return Verdict.REJECTED, (f"The best value, {value:.2f} m, is not above the threshold of {threshold:.2f} m.",)
