@@ -35,6 +35,7 @@ ORDER = (
     "loops",
     "events",
     "project",
+    "_database",
     "store",
     "simulate",
     "export",
@@ -42,7 +43,7 @@ ORDER = (
 )
 """The data flow: a module imports only from those before it, or from its own package."""
 WEB = {"app", "fastapi", "starlette", "uvicorn", "viser", "httpx", "websockets", "typer", "rich"}
-TOUCH_FILES = {"logs", "export", "store", "benchmark", "simulate"}
+TOUCH_FILES = {"logs", "export", "_database", "store", "benchmark", "simulate"}
 FILE_MODULES = {"os", "shutil", "tempfile", "sqlite3", "gzip", "zipfile", "glob", "platformdirs"}
 FILE_CALLS = {"open", "read_text", "write_text", "read_bytes", "write_bytes", "mkdir", "unlink", "loadtxt", "savetxt"}
 SCENE = {"scene", "proxy"}
