@@ -1,0 +1,112 @@
+// The candidates of the selected integration, best first or sorted by a column; a click moves the second map in the scene.
+
+import { byId, fill, h, set, text } from "./dom.js";
+import { count, degrees, fixed, pose, whole } from "./format.js";
+
+const MOST = 500;
+const COLUMNS = [
+  { label: "#", title: "rank by value", of: (c) => c.rank, show: (c) => c.rank + 1 },
+  { label: "value", title: "value of the transformation, metres", of: (c) => -c.value, show: (c) => fixed(c.value, 2) },
+  { label: "x", title: "metres", of: (c) => c.pose.x, show: (c) => fixed(c.pose.x, 2) },
+  { label: "y", title: "metres", of: (c) => c.pose.y, show: (c) => fixed(c.pose.y, 2) },
+  { label: "θ°", title: "degrees", of: (c) => c.pose.theta, show: (c) => degrees(c.pose.theta) },
+  { label: "angles", title: "the segments whose angles it superimposes: of the first map, of the second map", of: (c) => c.angle_1[0], show: (c) => `${c.angle_1.join("·")} → ${c.angle_2.join("·")}` },
+];
+
+export class Candidates {
+  #candidates = [];
+  #column = 0;
+  #reverse = false;
+
+  constructor() {
+    this.body = byId("candidates-body");
+    fill(byId("candidates-head"), COLUMNS.map((column, index) => this.#header(column, index)));
+    this.body.addEventListener("click", (event) => this.#choose(event.target.closest("tr")));
+    this.body.addEventListener("keydown", (event) => this.#key(event));
+  }
+
+  show({ match }, view) {
+    this.view = view;
+    this.#candidates = (match?.ranked ?? []).map((found, rank) => ({ ...found, rank, pose: pose(found.T_1_2) }));
+    text(byId("candidates-note"), note(match, this.#candidates.length));
+    byId("candidates-table").hidden = this.#candidates.length === 0;
+    this.#draw();
+  }
+
+  /** Mark the candidate the scene shows. */
+  mark({ snapshot }) {
+    const rank = String(snapshot.candidate ?? 0);
+    for (const row of this.body.rows) {
+      const chosen = row.dataset.rank === rank;
+      if (chosen && row.getAttribute("aria-selected") !== "true") reveal(row, byId("panel-candidates"));
+      set(row, "aria-selected", String(chosen));
+      row.tabIndex = chosen ? 0 : -1;
+    }
+  }
+
+  /** Put the keyboard on the selected candidate. */
+  focus() {
+    this.body.querySelector("[aria-selected=true]")?.focus();
+  }
+
+  #draw() {
+    const { of } = COLUMNS[this.#column];
+    const sorted = [...this.#candidates].sort((a, b) => (of(a) - of(b) || a.rank - b.rank) * (this.#reverse ? -1 : 1));
+    fill(this.body, sorted.slice(0, MOST).map(line));
+    this.#headers();
+    if (this.view) this.mark(this.view);
+  }
+
+  #header({ label, title }, index) {
+    const button = h("button", { type: "button", title: `sort by ${title}`, onclick: () => this.#sort(index) }, label);
+    return h("th", { scope: "col" }, button);
+  }
+
+  #headers() {
+    [...byId("candidates-head").children].forEach((header, index) => {
+      const order = this.#reverse ? "descending" : "ascending";
+      set(header, "aria-sort", index === this.#column ? order : null);
+    });
+  }
+
+  #sort(index) {
+    this.#reverse = index === this.#column && !this.#reverse;
+    this.#column = index;
+    this.#draw();
+  }
+
+  #choose(row) {
+    if (!row || !this.view) return;
+    row.focus();
+    this.view.act("set_candidate", Number(row.dataset.rank)).catch((error) => this.view.project.tell("trouble", error));
+  }
+
+  #key(event) {
+    const row = event.target.closest("tr");
+    const next = { ArrowDown: row?.nextElementSibling, ArrowUp: row?.previousElementSibling }[event.key];
+    if (next === undefined) return;
+    event.preventDefault();
+    this.#choose(next);
+  }
+}
+
+/** Scroll the panel, and only the panel, until the row is in sight below the sticky head. */
+function reveal(row, panel) {
+  const [inner, outer] = [row.getBoundingClientRect(), panel.getBoundingClientRect()];
+  const above = inner.top - inner.height - outer.top;
+  const below = inner.bottom - outer.bottom;
+  if (above < 0) panel.scrollTop += above;
+  else if (below > 0) panel.scrollTop += below;
+}
+
+function line(candidate) {
+  const cells = COLUMNS.map((column) => h("td", {}, String(column.show(candidate))));
+  return h("tr", { "data-rank": candidate.rank, "aria-selected": "false" }, cells);
+}
+
+function note(match, kept) {
+  if (!match) return "";
+  const [first, second] = match.segments;
+  const tried = `${count(match.candidates, "candidate")} on ${first} × ${second} segments, ${whole(match.discarded)} discarded`;
+  return kept < match.candidates - match.discarded ? `${tried}; the best ${whole(kept)}:` : `${tried}.`;
+}

@@ -1,0 +1,80 @@
+// The selected integration: what was found, by which heuristic, and why. Feeds the candidate and heuristics tables.
+
+import { byId, fill, h, icon, setIcon, text } from "./dom.js";
+import { pair, metres } from "./format.js";
+import { stateIcon, stateLabel } from "./queue.js";
+
+export class Detail {
+  #loading = null;
+  #shown = "";
+
+  /** `panels` have show(detail, view) and mark(view). */
+  constructor(project, view, panels) {
+    Object.assign(this, { project, view, panels });
+    view.addEventListener("changed", () => this.#follow());
+    project.addEventListener("match", ({ detail }) => detail.integration === view.integration && this.load());
+    project.addEventListener("parameters", () => this.load());
+    project.addEventListener("rows", () => this.#head());
+  }
+
+  /** Fetch what is known of the selection; an answer to an earlier selection is dropped. */
+  async load() {
+    this.#loading?.abort();
+    this.#loading = new AbortController();
+    const { integration, snapshot, project } = this.view;
+    if (!integration) return;
+    try {
+      const detail = await project.detail(integration, snapshot.heuristic, this.#loading.signal);
+      for (const panel of this.panels) panel.show(detail, this.view);
+      this.#reasons(detail);
+    } catch (error) {
+      if (error.name !== "AbortError") project.tell("trouble", error);
+    }
+  }
+
+  #follow() {
+    const { integration, snapshot } = this.view;
+    const wanted = `${integration} ${snapshot.heuristic ?? ""}`;
+    this.#head();
+    if (wanted === this.#shown) for (const panel of this.panels) panel.mark(this.view);
+    else this.load();
+    this.#shown = wanted;
+  }
+
+  #head() {
+    const row = this.project.row(this.view.integration);
+    byId("detail").hidden = row === null;
+    if (!row) return;
+    text(byId("detail-pair"), pair(row.id));
+    byId("detail-state").dataset.state = row.state;
+    setIcon(byId("detail-state").firstElementChild, stateIcon(row.state));
+    text(byId("detail-state").lastElementChild, decidedBy(row));
+    this.#clearing(row);
+  }
+
+  #clearing(row) {
+    const button = byId("detail-clear");
+    button.hidden = row.state !== "accepted" && row.state !== "rejected";
+    button.onclick = () => this.project.decide([row.id], "undecided").catch((error) => this.project.tell("trouble", error));
+  }
+
+  #reasons({ row, match }) {
+    const reasons = match?.reasons ?? (row.state === "failed" ? [row.reason] : ["This pair is being matched; it goes before the others."]);
+    fill(byId("detail-reasons"), reasons.map((reason) => h("li", {}, reason)), decisionReason(row));
+  }
+}
+
+/** Fill the place of the state with an icon and a text to be set later. */
+export function prepare(element) {
+  fill(element, icon("open"), h("span"));
+}
+
+function decidedBy(row) {
+  const value = row.value ? `, ${metres(row.value)}` : "";
+  return `${stateLabel(row.state)}${row.who ? ` by ${row.who}` : ""}${value}`;
+}
+
+function decisionReason(row) {
+  const decided = row.state === "accepted" || row.state === "rejected";
+  return decided && row.reason ? h("li", {}, `Reason given: ${row.reason}`) : null;
+}

@@ -1,0 +1,69 @@
+// Hotkeys, the same ones as in the scene, and the sheet that lists them.
+
+import { fill, h } from "./dom.js";
+
+/** Keys by group: [keys, what they do, name of the action]. W A S D Q E and the arrows move the scene's camera. */
+export const KEYS = [
+  ["Integrations", [
+    ["J", "next in the queue", "next"],
+    ["K", "previous in the queue", "previous"],
+    ["L", "skip: decide later", "skip"],
+    ["/", "search the queue", "search"],
+  ]],
+  ["Candidates and heuristics", [
+    ["N", "next candidate", "next_candidate"],
+    ["P", "previous candidate", "previous_candidate"],
+    ["H", "next heuristic", "next_heuristic"],
+    ["Shift+H", "previous heuristic", "previous_heuristic"],
+  ]],
+  ["Decide", [
+    ["Y", "accept", "accept"],
+    ["X", "reject", "reject"],
+    ["U", "undo", "undo"],
+    ["R", "redo", "redo"],
+  ]],
+  ["Scene", [
+    ["T", "next stage", "next_stage"],
+    ["Shift+T", "previous stage", "previous_stage"],
+    ["V", "2D or 3D", "toggle_dimension"],
+    ["?", "this sheet", "help"],
+  ]],
+];
+
+/** Call `actions[name]()` on its key, except while somebody types or a dialogue is open. */
+export function listen(actions) {
+  const names = new Map(KEYS.flatMap(([, keys]) => keys.map(([key, , name]) => [key, name])));
+  document.addEventListener("keydown", (event) => {
+    if (typing(event)) return;
+    const action = actions[names.get(pressed(event))];
+    if (!action || (event.repeat && DELIBERATE.has(names.get(pressed(event))))) return;
+    event.preventDefault();
+    action();
+  });
+}
+
+const DELIBERATE = new Set(["accept", "reject", "undo", "redo", "skip"]);
+
+/** Fill the help sheet. */
+export function sheet(dialog) {
+  const groups = KEYS.map(([title, keys]) => h("section", {}, h("h3", {}, title), h("dl", {}, keys.map(line))));
+  const close = h("button.primary", { type: "button", autofocus: true, onclick: () => dialog.close() }, "Close");
+  const note = h("p.muted", {}, "The same keys work in the scene, after a click into it. W A S D Q E and the arrows move its camera; drag to pan, scroll to zoom.");
+  fill(dialog, h("h2", { id: "help-title" }, "Keyboard"), h("div.groups", {}, groups), note, close);
+}
+
+function line([key, what]) {
+  const parts = key.split("+").map((part) => h("kbd", {}, part));
+  return h("div", {}, h("dt", {}, parts), h("dd", {}, what));
+}
+
+function pressed(event) {
+  const letter = event.key.length === 1 ? event.key.toUpperCase() : event.key;
+  return event.shiftKey && /^[A-Z]$/.test(letter) ? `Shift+${letter}` : letter;
+}
+
+function typing(event) {
+  const field = event.target.closest?.("input, select, textarea");
+  const types = field && !["range", "checkbox", "button"].includes(field.type);
+  return types || event.ctrlKey || event.metaKey || event.altKey || event.isComposing || document.querySelector("dialog:modal") !== null;
+}

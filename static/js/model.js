@@ -1,0 +1,140 @@
+// What the page knows of its project: a mirror of the server, refreshed when the server says that something changed.
+
+import { get, post } from "./api.js";
+
+const MATCHING_PAUSE = 700;
+const DECISION_PAUSE = 60;
+
+/** Tells "info", "rows", "progress", "match", "parameters" and "trouble" as events. */
+export class Project extends EventTarget {
+  constructor(id) {
+    super();
+    this.id = id;
+    this.url = `/api/projects/${encodeURIComponent(id)}`;
+    this.info = null;
+    this.rows = [];
+    this.index = new Map();
+    this.refreshInfo = coalesced(() => this.#loadInfo(), (error) => this.tell("trouble", error));
+    this.refreshRows = coalesced(() => this.#loadRows(), (error) => this.tell("trouble", error));
+  }
+
+  load() {
+    return Promise.all([this.#loadInfo(), this.#loadRows()]);
+  }
+
+  refresh(pause = DECISION_PAUSE) {
+    this.refreshInfo(pause);
+    this.refreshRows(pause);
+  }
+
+  row(id) {
+    return this.index.get(id) ?? null;
+  }
+
+  /** The ids of rows in a state; `above` true or false narrows to values above the threshold or not. */
+  ids(state, above = null) {
+    return this.rows.filter((row) => row.state === state && (above === null || Boolean(row.above) === above)).map((row) => row.id);
+  }
+
+  detail(id, heuristic, signal) {
+    const query = heuristic ? `?heuristic=${encodeURIComponent(heuristic)}` : "";
+    return get(`${this.url}/integrations/${encodeURIComponent(id)}${query}`, { signal });
+  }
+
+  flips(value, signal) {
+    return get(`${this.url}/threshold?value=${value}`, { signal });
+  }
+
+  decide(integrations, verdict) {
+    return this.#change("decisions", { integrations, verdict, expected_revision: this.info.revision });
+  }
+
+  undo() {
+    return this.#change("undo");
+  }
+
+  redo() {
+    return this.#change("redo");
+  }
+
+  setParameters(body) {
+    return this.#change("parameters", body);
+  }
+
+  async matching(action) {
+    await post(`${this.url}/matching`, { action });
+    this.refreshInfo();
+  }
+
+  /** Take in one event of the server. */
+  hear(event) {
+    if (event.type === "match") this.#matched(event);
+    else if (event.type === "progress") this.#progressed(event);
+    else if (event.type === "parameters") this.refresh(), this.tell("parameters");
+    else if (event.type === "decision" || event.type === "log") this.refresh();
+    else if (event.type === "map") this.refreshInfo(), this.tell("map");
+    else if (event.type === "error") this.tell("trouble", new Error(event.message));
+  }
+
+  tell(type, detail = null) {
+    this.dispatchEvent(new CustomEvent(type, { detail }));
+  }
+
+  async #change(what, body) {
+    try {
+      const change = await post(`${this.url}/${what}`, body);
+      this.info.revision = change.revision ?? this.info.revision;
+      return change;
+    } finally {
+      this.refresh();
+    }
+  }
+
+  async #loadInfo() {
+    this.info = await get(this.url);
+    this.tell("info");
+    this.tell("progress");
+  }
+
+  async #loadRows() {
+    const { integrations } = await get(`${this.url}/integrations`);
+    this.rows = integrations;
+    this.index = new Map(integrations.map((row) => [row.id, row]));
+    this.tell("rows");
+  }
+
+  /** A match was found: show it in its place at once, and the new order when there is time. */
+  #matched(event) {
+    if (event.row && this.index.has(event.integration)) {
+      Object.assign(this.index.get(event.integration), event.row);
+      this.tell("rows");
+    }
+    this.refresh(MATCHING_PAUSE);
+    this.tell("match", event);
+  }
+
+  #progressed(event) {
+    if (!this.info) return;
+    Object.assign(this.info.progress, event);
+    this.tell("progress");
+  }
+}
+
+/** Run `work` soon, but never twice at the same time and not again before a pause; calls in between become one. */
+function coalesced(work, failed) {
+  let [timer, busy, finished, pause] = [0, false, -Infinity, Infinity];
+  const run = async () => {
+    [busy, pause] = [true, Infinity];
+    await work().catch(failed);
+    [busy, finished] = [false, performance.now()];
+    schedule();
+  };
+  const schedule = () => {
+    clearTimeout(timer);
+    if (!busy && pause < Infinity) timer = setTimeout(run, Math.max(0, finished + pause - performance.now()));
+  };
+  return (asked = DECISION_PAUSE) => {
+    pause = Math.min(pause, asked);
+    schedule();
+  };
+}

@@ -1,0 +1,138 @@
+// The parameters: one form made of what the server says of each (unit, bounds, help).
+
+import { get } from "./api.js";
+import { byId, fill, h, set, text } from "./dom.js";
+import { count } from "./format.js";
+
+export class ParameterDrawer {
+  #fields = new Map();
+  #presets = {};
+
+  constructor(project) {
+    this.project = project;
+    this.dialog = byId("parameters");
+    this.form = byId("parameters-form");
+    byId("parameters-open").addEventListener("click", () => this.toggle());
+    byId("parameters-close").addEventListener("click", () => this.dialog.close());
+    this.dialog.addEventListener("close", () => byId("parameters-open").focus());
+    this.dialog.addEventListener("keydown", (event) => event.key === "Escape" && this.dialog.close());
+    this.form.addEventListener("input", () => this.#changed());
+    this.form.addEventListener("submit", (event) => (event.preventDefault(), this.#apply()));
+    byId("parameters-preset").addEventListener("change", (event) => this.#take(this.#presets[event.target.value]));
+    byId("parameters-revert").addEventListener("click", () => this.#fill());
+    project.addEventListener("info", () => this.dialog.open && this.#changes().size === 0 && this.#fill());
+  }
+
+  async toggle() {
+    if (this.dialog.open) return this.dialog.close();
+    if (this.#fields.size === 0) await this.#make();
+    this.#fill();
+    this.dialog.show();
+    return byId("parameters-close").focus();
+  }
+
+  async #make() {
+    const { parameters, presets } = await get("/api/parameters");
+    this.#presets = presets;
+    fill(byId("parameters-preset"), h("option", { value: "" }, "Values of a preset…"), Object.keys(presets).map((name) => h("option", {}, name)));
+    fill(byId("parameters-heuristic"), this.project.info.heuristics.map((name) => h("option", {}, name)));
+    fill(byId("parameters-list"), parameters.map((parameter) => this.#field(parameter)));
+  }
+
+  #field(parameter) {
+    const id = `parameter-${parameter.name}`;
+    const input = control(parameter, id);
+    this.#fields.set(parameter.name, { parameter, input });
+    const label = h("label", { for: id, title: parameter.name }, words(parameter.name));
+    const box = h("div.control", {}, input, parameter.unit && h("span.unit", {}, parameter.unit));
+    return h("li", { "data-name": parameter.name }, label, box, h("p.help", { id: `${id}-help` }, parameter.help, " ", h("span.bounds", {}, bounds(parameter))));
+  }
+
+  #fill() {
+    this.#take(this.project.info.parameters);
+    byId("parameters-heuristic").value = this.project.info.heuristic;
+    byId("parameters-preset").value = "";
+    this.#complain("");
+    this.#changed();
+  }
+
+  #take(values) {
+    for (const [name, value] of Object.entries(values ?? {})) {
+      const field = this.#fields.get(name);
+      if (field) write(field, value);
+    }
+    this.#changed();
+  }
+
+  /** What the form says that the project does not. */
+  #changes() {
+    const changes = new Map();
+    for (const [name, field] of this.#fields) {
+      const value = read(field);
+      if (value !== this.project.info.parameters[name]) changes.set(name, value);
+    }
+    return changes;
+  }
+
+  #changed() {
+    const changes = this.#changes();
+    for (const [name, { input }] of this.#fields) set(input.closest("li"), "data-changed", changes.has(name));
+    const heuristic = byId("parameters-heuristic").value !== this.project.info.heuristic;
+    const number = changes.size + (heuristic ? 1 : 0);
+    text(byId("parameters-apply"), number ? `Apply ${count(number, "change")}` : "Apply");
+    for (const id of ["parameters-apply", "parameters-revert"]) byId(id).disabled = number === 0;
+  }
+
+  async #apply() {
+    const heuristic = byId("parameters-heuristic").value;
+    const body = { changes: Object.fromEntries(this.#changes()) };
+    if (heuristic !== this.project.info.heuristic) body.heuristic = heuristic;
+    try {
+      await this.project.setParameters(body);
+      Object.assign(this.project.info.parameters, body.changes);
+      this.project.info.heuristic = heuristic;
+      this.#complain("");
+      this.#changed();
+    } catch (error) {
+      this.#complain(error.message);
+    }
+  }
+
+  #complain(message) {
+    byId("parameters-error").hidden = !message;
+    text(byId("parameters-error"), message);
+  }
+}
+
+function control(parameter, id) {
+  const shared = { id, name: parameter.name, "aria-describedby": `${id}-help` };
+  if (parameter.kind === "boolean") return h("input", { type: "checkbox", ...shared });
+  if (parameter.kind === "choice") return h("select", shared, parameter.choices.map((choice) => h("option", {}, choice)));
+  const limits = { min: parameter.minimum ?? parameter.above, max: parameter.maximum ?? parameter.below };
+  const step = parameter.kind === "integer" ? 1 : "any";
+  return h("input", { type: "number", step, placeholder: parameter.optional ? "none" : null, required: !parameter.optional, ...limits, ...shared });
+}
+
+function read({ parameter, input }) {
+  if (parameter.kind === "boolean") return input.checked;
+  if (parameter.kind === "choice") return input.value;
+  return input.value === "" ? null : Number(input.value);
+}
+
+function write({ parameter, input }, value) {
+  if (parameter.kind === "boolean") input.checked = value;
+  else input.value = value ?? "";
+}
+
+function words(name) {
+  const plain = name.replaceAll("_", " ");
+  return plain[0].toUpperCase() + plain.slice(1);
+}
+
+function bounds({ default: standard, minimum, maximum, above, below, kind }) {
+  if (kind === "boolean") return `Default ${standard ? "on" : "off"}.`;
+  if (kind === "choice") return `Default ${standard}.`;
+  const low = above !== null ? `above ${above}` : minimum !== null ? `from ${minimum}` : "";
+  const high = below !== null ? `below ${below}` : maximum !== null ? `up to ${maximum}` : "";
+  return `Default ${standard ?? "none"}; ${[low, high].filter(Boolean).join(", ")}.`;
+}

@@ -1,0 +1,122 @@
+// A project's page: the queue at the left, the scene in the middle with the panel of the current step at its right.
+
+import { Candidates } from "./candidates.js";
+import { Detail, prepare } from "./detail.js";
+import { byId, h, text } from "./dom.js";
+import { exportMenu } from "./exports.js";
+import { head } from "./head.js";
+import { Heuristics } from "./heuristics.js";
+import { listen, sheet } from "./keys.js";
+import { Project } from "./model.js";
+import { announce, failed } from "./notices.js";
+import { ParameterDrawer } from "./parameters.js";
+import { pair } from "./format.js";
+import { Queue, stateLabel } from "./queue.js";
+import { cover, scene } from "./scene.js";
+import { Stream } from "./stream.js";
+import { summary } from "./summary.js";
+import { tabs } from "./tabs.js";
+import { Threshold } from "./threshold.js";
+import { View } from "./view.js";
+
+const project = new Project(decodeURIComponent(location.pathname.split("/")[2] ?? ""));
+const view = new View(project);
+const showTab = tabs(byId("tabs"));
+const candidates = new Candidates();
+const queue = new Queue(project, view, () => (showTab("tab-candidates"), candidates.focus()));
+
+start().catch(unavailable);
+
+async function start() {
+  prepare(byId("detail-state"));
+  new Detail(project, view, [candidates, new Heuristics(project)]);
+  new Threshold(project, queue);
+  new ParameterDrawer(project);
+  for (const part of [head, summary, exportMenu]) part(project);
+  project.addEventListener("trouble", ({ detail }) => failed(detail));
+  keyboard();
+  await project.load();
+  byId("workbench").setAttribute("aria-busy", "false");
+  await connect();
+}
+
+/** Open the view and its scene, and follow both from now on. */
+async function connect() {
+  const stream = new Stream({ hear, lost, back, refused: () => again(stream) });
+  scene(view, { "?": help, "/": search, Escape: () => byId("queue").focus() });
+  view.addEventListener("opened", () => listenTo(stream));
+  view.addEventListener("changed", remember);
+  addEventListener("pagehide", () => view.close());
+  addEventListener("pageshow", (event) => event.persisted && view.open().catch(failed));
+  document.addEventListener("visibilitychange", () => document.hidden || view.check().catch(failed));
+  await view.open(decodeURIComponent(location.hash.slice(1)));
+  if (!view.integration && project.rows.length) await view.select(project.rows[0].id);
+  if (project.rows.length === 0) cover("There is nothing to show: this project has no pair of scans.");
+}
+
+function listenTo(stream) {
+  stream.open(`${project.url}/events?view=${encodeURIComponent(view.id)}`);
+}
+
+/** The server does not know the view any more, as after a restart: open another, or listen again where it does. */
+async function again(stream) {
+  const before = view.id;
+  await view.check().catch(() => {});
+  if (view.id === before) listenTo(stream);
+}
+
+function hear(event) {
+  if (event.type !== "view") project.hear(event);
+  else if ((event.view ?? view.id) === view.id) view.hear(event.snapshot ?? event);
+}
+
+function lost() {
+  byId("offline").hidden = false;
+}
+
+function back() {
+  byId("offline").hidden = true;
+  project.refresh();
+  view.check().catch(failed);
+}
+
+/** Keep the selection in the address, so that a reload and a link lead back to it. */
+function remember() {
+  const wanted = view.integration ? `#${view.integration}` : "";
+  if (location.hash === wanted) return;
+  history.replaceState(null, "", wanted || location.pathname);
+  const row = project.row(view.integration);
+  if (row) announce(`${pair(row.id)}, ${stateLabel(row.state)}`);
+}
+
+function keyboard() {
+  sheet(byId("help"));
+  byId("help-open").addEventListener("click", help);
+  const act = (action) => () => view.act(action).catch(failed);
+  const actions = { next: () => queue.step(1), previous: () => queue.step(-1), search, help };
+  for (const name of ["undo", "redo"]) actions[name] = () => byId(name).disabled || byId(name).click();
+  for (const name of ["skip", "accept", "reject", "toggle_dimension"]) actions[name] = act(name);
+  for (const what of ["candidate", "heuristic", "stage"]) {
+    for (const way of ["next", "previous"]) actions[`${way}_${what}`] = act(`${way}_${what}`);
+  }
+  listen(actions);
+}
+
+function help() {
+  byId("help").showModal();
+}
+
+function search() {
+  window.focus();
+  byId("search").select();
+  byId("search").focus();
+}
+
+/** The project cannot be shown at all: say why, and lead back. */
+function unavailable(error) {
+  const home = h("a.button", { href: "/" }, "All projects");
+  const again = h("button.primary", { type: "button", onclick: () => location.reload() }, "Try again");
+  const message = h("div.message.error", { role: "alert" }, h("p"), h("div.row", {}, again, home));
+  text(message.firstElementChild, error.message);
+  byId("workbench").replaceChildren(h("div.unavailable", {}, message));
+}

@@ -1,0 +1,187 @@
+// The review queue: the integrations in the server's order, the one that most needs a person first.
+
+import { byId, fill, h, icon, set, setIcon, text } from "./dom.js";
+import { count, metres, pair, whole } from "./format.js";
+import { VirtualList } from "./virtual.js";
+
+const HEIGHT = 34;
+const STATES = {
+  pending: { label: "to decide", icon: "open" },
+  accepted: { label: "accepted", icon: "check" },
+  rejected: { label: "rejected", icon: "close" },
+  none: { label: "no transformation found", icon: "none" },
+  failed: { label: "matching failed", icon: "alert" },
+  matching: { label: "being matched", icon: "waiting" },
+};
+const FILTERS = [
+  ["all", "All", () => true],
+  ["pending", "Open", (row) => row.state === "pending"],
+  ["accepted", "Accepted", (row) => row.state === "accepted"],
+  ["rejected", "Rejected", (row) => row.state === "rejected"],
+  ["none", "None", (row) => row.state === "none" || row.state === "failed"],
+];
+
+export const stateLabel = (state) => STATES[state]?.label ?? state;
+export const stateIcon = (state) => STATES[state]?.icon ?? "none";
+
+export class Queue {
+  #filter = "all";
+  #search = "";
+  #flips = { passes: new Set(), fails: new Set() };
+  #shown = [];
+  #scale = 1;
+
+  constructor(project, view, enter) {
+    Object.assign(this, { project, view, enter });
+    this.box = byId("queue");
+    this.list = new VirtualList(this.box, { height: HEIGHT, make: makeRow, draw: (element, row) => this.#draw(element, row), key: (row) => row.id });
+    this.#controls();
+    project.addEventListener("rows", () => this.refresh());
+    view.addEventListener("changed", () => this.#follow());
+  }
+
+  /** The rows the filter and the search let through, in queue order. */
+  get rows() {
+    return this.#shown;
+  }
+
+  /** Draw the rows again after they, the filter or the search changed. */
+  refresh() {
+    const test = FILTERS.find(([name]) => name === this.#filter)[2];
+    this.#shown = this.project.rows.filter((row) => test(row) && found(row, this.#search));
+    this.#scale = scale(this.project.rows, this.project.info?.threshold ?? 0);
+    this.list.show(this.#shown, this.view.integration);
+    this.#chips();
+    this.#empty();
+    this.#mark();
+  }
+
+  /** Mark the rows another threshold would flip. */
+  preview(passes, fails) {
+    this.#flips = { passes: new Set(passes), fails: new Set(fails) };
+    this.list.show(this.#shown, this.view.integration);
+  }
+
+  /** Select the row `steps` further down; with nothing selected, or out of the filter, the first. */
+  step(steps) {
+    const at = this.#shown.findIndex((row) => row.id === this.view.integration);
+    const wanted = at < 0 ? 0 : Math.min(this.#shown.length - 1, Math.max(0, at + steps));
+    if (this.#shown[wanted]) this.select(this.#shown[wanted].id);
+  }
+
+  select(id) {
+    this.view.select(id);
+    this.list.reveal(id);
+  }
+
+  #controls() {
+    byId("search").addEventListener("input", (event) => this.#find(event.target.value));
+    this.box.addEventListener("keydown", (event) => this.#key(event));
+    this.box.addEventListener("click", (event) => {
+      const row = event.target.closest("[role=option]");
+      if (row) this.select(row.dataset.id);
+    });
+    fill(byId("filters"), FILTERS.map(([name, label]) => this.#chip(name, label)));
+  }
+
+  #chip(name, label) {
+    const choose = () => {
+      this.#filter = name;
+      this.refresh();
+    };
+    const number = h("span.number");
+    return h("button.chip", { type: "button", "data-filter": name, onclick: choose }, label, " ", number);
+  }
+
+  #chips() {
+    for (const chip of byId("filters").children) {
+      const [name, , test] = FILTERS.find(([filter]) => filter === chip.dataset.filter);
+      set(chip, "aria-pressed", String(name === this.#filter));
+      text(chip.lastElementChild, whole(this.project.rows.filter(test).length));
+    }
+  }
+
+  #find(words) {
+    this.#search = words.trim().toLowerCase();
+    this.refresh();
+  }
+
+  #empty() {
+    const note = byId("queue-empty");
+    note.hidden = this.#shown.length > 0;
+    text(note, this.project.rows.length ? "No integration passes this filter." : nothing(this.project.info));
+  }
+
+  #key(event) {
+    const steps = { ArrowDown: 1, ArrowUp: -1, PageDown: this.list.fits, PageUp: -this.list.fits, Home: -Infinity, End: Infinity }[event.key];
+    if (event.key === "Enter") this.enter();
+    else if (steps) this.step(steps);
+    else return;
+    event.preventDefault();
+  }
+
+  #follow() {
+    if (this.view.integration !== this.#followed) this.list.reveal(this.view.integration);
+    this.#followed = this.view.integration;
+    this.#mark();
+  }
+
+  #followed = null;
+
+  #mark() {
+    for (const element of this.list.canvas.children) {
+      const selected = !element.hidden && element.dataset.id === this.view.integration;
+      set(element, "aria-selected", String(selected));
+      if (selected) this.box.setAttribute("aria-activedescendant", element.id);
+    }
+  }
+
+  #draw(element, row) {
+    const [state, id, bar, value, note] = element.children;
+    Object.assign(element.dataset, { id: row.id, state: row.state });
+    element.id = `row-${row.id}`;
+    setIcon(state.firstElementChild, stateIcon(row.state));
+    text(state.lastElementChild, stateLabel(row.state));
+    text(id, pair(row.id));
+    drawBar(bar, row, this.#scale, this.project.info?.threshold ?? 0);
+    text(value, row.value === null || row.value === undefined ? "" : metres(row.value));
+    this.#note(note, row);
+    set(element, "aria-selected", String(row.id === this.view.integration));
+  }
+
+  #note(note, row) {
+    const flip = this.#flips.passes.has(row.id) ? "would pass" : this.#flips.fails.has(row.id) ? "would fail" : "";
+    note.className = flip ? `note ${flip.replace(" ", "-")}` : "note";
+    text(note, flip || (row.state === "pending" ? row.heuristic : SHORT[row.state] ?? row.heuristic));
+  }
+}
+
+const SHORT = { none: "none found", failed: "failed", matching: "matching" };
+
+function makeRow() {
+  const state = h("span.state", {}, icon("open"), h("span.only-read"));
+  const bar = h("span.bar", { "aria-hidden": "true" }, h("i.fill"), h("i.limit"));
+  return h("div.item", { role: "option" }, state, h("span.pair"), bar, h("span.value"), h("span.note"));
+}
+
+function drawBar(bar, row, scale, threshold) {
+  const share = Math.min(1, (row.value ?? 0) / scale);
+  bar.firstElementChild.style.width = `${100 * share}%`;
+  bar.lastElementChild.style.left = `${100 * Math.min(1, threshold / scale)}%`;
+}
+
+/** Metres at the right end of the bars: what all but the highest few values fit into. */
+function scale(rows, threshold) {
+  const values = rows.map((row) => row.value ?? 0).sort((a, b) => a - b);
+  return Math.max(2 * threshold, values[Math.floor(0.95 * (values.length - 1))] ?? 0, 0.01);
+}
+
+function found(row, words) {
+  return !words || [row.id, pair(row.id), row.heuristic, row.who, row.reason, stateLabel(row.state)].some((part) => part?.toLowerCase().includes(words));
+}
+
+function nothing(info) {
+  const scans = info ? info.logs.reduce((sum, log) => sum + log.scans, 0) : 0;
+  if (scans === 0) return "The logs of this project hold no scans, so there is nothing to integrate.";
+  return `${count(scans, "scan")} cannot make a pair: integrations need two consecutive scans of one log.`;
+}

@@ -1,0 +1,31 @@
+// The scene in the middle: an iframe of our own address.
+
+import { byId, text } from "./dom.js";
+
+const DARK = matchMedia("(prefers-color-scheme: dark)");
+
+/** Show the scene of a view, each time the view is opened; `keys` are those the page answers when the scene has the keyboard. */
+export function scene(view, keys) {
+  const frame = byId("scene");
+  view.addEventListener("opened", () => {
+    cover("Loading the scene…");
+    frame.src = DARK.matches ? `${view.scene}?darkMode` : view.scene;
+  });
+  frame.addEventListener("load", () => loaded(frame, keys));
+}
+
+/** Cover the scene with a sentence, or uncover it. */
+export function cover(sentence) {
+  byId("scene-cover").hidden = !sentence;
+  text(byId("scene-cover-text"), sentence);
+}
+
+function loaded(frame, keys) {
+  const inside = frame.contentDocument;
+  if (!inside || inside.URL === "about:blank") return;
+  cover(inside.querySelector("#root, canvas, svg") ? "" : "The scene could not be loaded. Reload the page to try again.");
+  inside.addEventListener("keydown", (event) => {
+    if (event.target.closest?.("input, textarea") || event.ctrlKey || event.metaKey) return;
+    keys[event.key]?.();
+  });
+}

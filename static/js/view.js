@@ -1,0 +1,92 @@
+// This page's view: what its scene shows. The server keeps it; the page asks for changes and mirrors the answer.
+
+import { get, post } from "./api.js";
+
+/** Tells "opened" (there is a new scene) and "changed" (the snapshot) as events. */
+export class View extends EventTarget {
+  #sending = 0;
+  #wanted = null;
+
+  constructor(project) {
+    super();
+    this.project = project;
+    this.id = null;
+    this.scene = null;
+    this.snapshot = {};
+  }
+
+  get integration() {
+    return this.snapshot.integration ?? null;
+  }
+
+  async open(integration = this.integration) {
+    const { id, scene } = await post(`${this.project.url}/views`);
+    this.id = id;
+    this.scene = scene;
+    this.dispatchEvent(new Event("opened"));
+    if (integration && this.project.row(integration)) await this.act("select", integration);
+    else this.apply(await get(this.#url));
+  }
+
+  /** Ask for a change; a view the server no longer has is opened again first. */
+  async act(action, value = null) {
+    this.#sending += 1;
+    try {
+      const snapshot = await this.#post(action, value);
+      if (this.#sending === 1) this.apply(snapshot);
+    } finally {
+      this.#sending -= 1;
+    }
+  }
+
+  /** Select an integration: shown at once; of many quick selections only the last is sent. */
+  async select(id) {
+    this.apply({ ...this.snapshot, integration: id, candidate: 0 });
+    const idle = this.#wanted === null;
+    this.#wanted = id;
+    while (idle && this.#wanted !== null) {
+      const sent = this.#wanted;
+      await this.act("select", sent).catch((error) => this.project.tell("trouble", error));
+      if (this.#wanted === sent) this.#wanted = null;
+    }
+  }
+
+  /** A snapshot that came by itself: the scene's own panel was used. Older ones than a pending action are not taken. */
+  hear(snapshot) {
+    if (this.#sending === 0) this.apply(snapshot);
+  }
+
+  apply(snapshot) {
+    this.snapshot = snapshot;
+    this.dispatchEvent(new Event("changed"));
+  }
+
+  /** Open the view again where the server has dropped it. */
+  async check() {
+    if (this.id === null) return;
+    try {
+      this.hear(await get(this.#url));
+    } catch (error) {
+      if (error.status !== 404) throw error;
+      await this.open();
+    }
+  }
+
+  close() {
+    if (this.id !== null) fetch(this.#url, { method: "DELETE", keepalive: true }).catch(() => {});
+  }
+
+  get #url() {
+    return `/api/views/${encodeURIComponent(this.id)}`;
+  }
+
+  async #post(action, value) {
+    try {
+      return await post(this.#url, { action, value });
+    } catch (error) {
+      if (error.status !== 404) throw error;
+      await this.open();
+      return post(this.#url, { action, value });
+    }
+  }
+}
