@@ -1,0 +1,161 @@
+"""All that one picture is made from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from app.drawables import Box, Pick, box
+from app.palette import PALETTES, Palette
+from segmap.chains import MatchingChain
+from segmap.fusion import Fusion
+from segmap.integration import Candidate
+from segmap.merging import Component
+from segmap.parameters import Parameters
+from segmap.pose import FloatArray, Pose2
+from segmap.scans import ScanId
+from segmap.segments import SegmentMap
+
+__all__ = ["Content", "Pair", "Placed", "place"]
+
+GAP = 1.0
+"""metres between things that have no relation to each other"""
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """The selected integration, as far as it is known."""
+
+    integration: str
+    scans: tuple[ScanId, ScanId]
+    names: tuple[str, str]
+    """of the scans, for people"""
+    maps: tuple[SegmentMap, SegmentMap]
+    returns: tuple[FloatArray, FloatArray]
+    """points of shape (n, 2), metres, each in its own sensor's frame"""
+    parameters: Parameters
+    ranked: tuple[Candidate, ...] = ()
+    candidate: Candidate | None = None
+    """the one shown, of those"""
+    chains: tuple[MatchingChain, ...] = ()
+    """at that candidate"""
+    fusion: Fusion | None = None
+    """at that candidate, where it was asked for"""
+
+    @cached_property
+    def by_value(self) -> tuple[int, ...]:
+        """The chains' indices, the one that adds most to the value first."""
+        return tuple(sorted(range(len(self.chains)), key=lambda k: -self.chains[k].value))
+
+    @cached_property
+    def beside(self) -> Pose2:
+        """A place for the second scan beside the first, for when they have no relation yet."""
+        (_, _, right, _), (left, _, _, _) = (
+            box(m.coordinates, r, np.zeros(2)) or (0.0, 0.0, 0.0, 0.0)
+            for m, r in zip(self.maps, self.returns, strict=True)
+        )
+        return Pose2(right - left + GAP, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A component of the merged map, where it is drawn."""
+
+    component: Component
+    T_map_component: Pose2
+    """where its frame is drawn; the frames of two components have no relation to each other"""
+    colour: int
+    """which colour of the palette"""
+
+    @cached_property
+    def map(self) -> SegmentMap:
+        """Its segments, where they are drawn."""
+        return self.component.map.moved(self.T_map_component)
+
+    def pose(self, scan: ScanId) -> Pose2:
+        """Where a scan of it is drawn."""
+        return self.T_map_component @ self.component.poses[scan]
+
+
+def place(components: Iterable[Component], scans: Iterable[ScanId] = ()) -> tuple[Placed, ...]:
+    """Where components are drawn: the one with the first of ``scans`` at the origin, the others in a row beside it.
+
+    Components of one scan are left out: they are scans that nothing was integrated with.
+    """
+    wanted = next(iter(scans), None)
+    grown = [(index, c) for index, c in enumerate(c for c in components if len(c.scans) > 1)]
+    grown.sort(key=lambda item: (wanted not in item[1].scans, item[0]))
+    placed: list[Placed] = []
+    right = 0.0
+    for index, component in grown:
+        left, bottom, to, _ = component.map.bounds or (0.0, 0.0, 0.0, 0.0)
+        shift = Pose2(right - left + GAP, -bottom, 0.0) if placed else Pose2.identity()
+        right = shift.x + to
+        placed.append(Placed(component, shift, index))
+    return tuple(placed)
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """A stage of an integration, or the merged map, and how to look at it."""
+
+    stage: str
+    pair: Pair | None = None
+    components: tuple[Component, ...] = ()
+    dimension: int = 2
+    theme: str = "light"
+    shown: Mapping[str, bool] = field(default_factory=dict)
+    """layers switched on or off by hand, by name; the others are as the stage has them"""
+    picked: Pick | None = None
+    message: str = ""
+    """what to say where there is nothing to see"""
+
+    @property
+    def palette(self) -> Palette:
+        """The colours of the theme."""
+        return PALETTES[self.theme]
+
+    @cached_property
+    def placed(self) -> tuple[Placed, ...]:
+        """The components, where they are drawn."""
+        return place(self.components, self.pair.scans if self.pair else ())
+
+    def map_of(self, source: str) -> SegmentMap | None:
+        """The map that a Pick's source names, in its frame; None where it is not shown."""
+        if source in ("first", "second"):
+            return self.pair.maps[source == "second"] if self.pair is not None and self.stage != "map" else None
+        placed = self.placed if self.stage == "map" else ()
+        return next((p.map for p in placed if p.component.name == source), None)
+
+    @property
+    def superimposed(self) -> bool:
+        """Whether the second map stands where the candidate puts it."""
+        return self.pair is not None and self.pair.candidate is not None and self.stage not in ("scans", "segments")
+
+    @property
+    def T_1_2(self) -> Pose2:
+        """Where the second map stands in the frame of the first."""
+        if self.pair is None:
+            return Pose2.identity()
+        if self.superimposed and self.pair.candidate is not None:
+            return self.pair.candidate.T_1_2
+        return self.pair.beside
+
+    @cached_property
+    def bounds(self) -> Box | None:
+        """The box around what matters, metres; None where there is nothing."""
+        if self.stage == "map":
+            return box(*(p.map.coordinates for p in self.placed))
+        if self.pair is None:
+            return None
+        first, second = (
+            np.concatenate((m.coordinates.reshape(-1, 2), r))
+            for m, r in zip(self.pair.maps, self.pair.returns, strict=True)
+        )
+        if not len(first) and not len(second):
+            return None
+        T_1_2 = self.T_1_2
+        return box(first, np.zeros(2), T_1_2 @ second, np.array([T_1_2.x, T_1_2.y]))

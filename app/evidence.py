@@ -1,0 +1,125 @@
+"""What is known of the integration a view looks at: the session's results, and what follows from them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from app.content import Content, Pair
+from app.looks import Looks
+from segmap.chains import matching_chains
+from segmap.fusion import fuse
+from segmap.integration import Match
+from segmap.project import IntegrationId, ProjectState
+from segmap.scans import ScanId
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+__all__ = ["Evidence", "scan_name"]
+
+KEPT = 64
+"""candidates whose chains are remembered"""
+SAME_POSE = 1e-6
+"""metres, radians"""
+
+
+def scan_name(scan: ScanId, state: ProjectState) -> str:
+    """A scan's name for people; with its log's name where there are several logs."""
+    if len(state.logs) < 2:
+        return f"scan {scan.scan}"
+    return f"{state.logs[scan.log].name}, scan {scan.scan}"
+
+
+class Evidence:
+    """The content of a view's picture; chains and fused maps are computed once for each candidate. Thread-safe."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._chains = lru_cache(KEPT)(matching_chains)
+        self._fused = lru_cache(KEPT)(fuse)
+
+    def match(self, looks: Looks) -> Match | None:
+        """The match of the integration looked at, by the heuristic looked at; None: not computed yet."""
+        if looks.integration is None:
+            return None
+        return self._session.match(looks.integration, self.heuristic(looks))
+
+    def unknown(self, looks: Looks) -> bool:
+        """Whether there is a match to be computed: none is there, and none has failed."""
+        integration, heuristic = looks.integration, self.heuristic(looks)
+        return integration is not None and self._session.outcome(integration, heuristic) is None
+
+    def heuristic(self, looks: Looks) -> str:
+        """The heuristic looked at, by name."""
+        return looks.heuristic or self._session.state.heuristic
+
+    def content(self, looks: Looks) -> Content:
+        """All that the picture is made from."""
+        pair = self._pair(looks)
+        return Content(
+            stage=looks.stage,
+            pair=pair,
+            components=tuple(self._session.components()) if looks.stage == "map" else (),
+            dimension=looks.dimension,
+            theme=looks.theme,
+            shown=looks.shown,
+            picked=looks.picked,
+            message=self._message(looks, pair),
+        )
+
+    def _pair(self, looks: Looks) -> Pair | None:
+        if looks.integration is None:
+            return None
+        session, state, match = self._session, self._session.state, self.match(looks)
+        scans = IntegrationId.parse(looks.integration)
+        reach = state.parameters.max_range
+        pair = Pair(
+            integration=looks.integration,
+            scans=(scans.first, scans.second),
+            names=(scan_name(scans.first, state), scan_name(scans.second, state)),
+            maps=(session.segment_map(scans.first), session.segment_map(scans.second)),
+            returns=(session.scan(scans.first).returns(reach)[0], session.scan(scans.second).returns(reach)[0]),
+            parameters=state.parameters,
+            ranked=match.ranked if match else (),
+        )
+        return self._at_candidate(pair, looks) if pair.ranked else pair
+
+    def _at_candidate(self, pair: Pair, looks: Looks) -> Pair:
+        candidate = pair.ranked[min(looks.rank, len(pair.ranked) - 1)]
+        chains = self._chains(*pair.maps, candidate.T_1_2, pair.parameters)
+        fusion = None
+        if looks.stage == "fused":
+            fusion = self._fused(*pair.maps, candidate.T_1_2, chains, pair.parameters)
+        return replace(pair, candidate=candidate, chains=chains, fusion=fusion)
+
+    def _message(self, looks: Looks, pair: Pair | None) -> str:
+        """Why there is less to see than one might expect, or something else; empty where there is no reason to ask."""
+        if looks.stage == "map":
+            grown = any(len(component.scans) > 1 for component in self._session.components())
+            return "" if grown else "Nothing is accepted yet: the merged map is empty."
+        if pair is None:
+            return "There is no pair to look at: the project has fewer than two scans."
+        match = self.match(looks)
+        if match is None:
+            return self._unmatched(looks, pair)
+        return self._elsewhere(pair) if match.ranked else " ".join(match.reasons)
+
+    def _unmatched(self, looks: Looks, pair: Pair) -> str:
+        outcome = self._session.outcome(pair.integration, self.heuristic(looks))
+        if outcome is not None and outcome.failure:
+            return outcome.failure
+        return f"{pair.names[0]} and {pair.names[1]} are being matched."
+
+    def _elsewhere(self, pair: Pair) -> str:
+        """A word on a decision that was made on another pose than the one shown."""
+        decision = self._session.state.decisions.get(pair.integration)
+        if decision is None or decision.T_1_2 is None or pair.candidate is None:
+            return ""
+        distance, turn = decision.T_1_2.distance(pair.candidate.T_1_2)
+        if max(distance, turn) < SAME_POSE:
+            return ""
+        x, y, degrees = decision.T_1_2.x, decision.T_1_2.y, math.degrees(decision.T_1_2.theta)
+        return f"This pair was {decision.verdict} at another pose: x {x:.2f} m, y {y:.2f} m, θ {degrees:.1f}°."

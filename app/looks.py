@@ -1,0 +1,46 @@
+"""What one view looks at, as one immutable value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+from app.drawables import Pick
+
+__all__ = ["Looks"]
+
+
+@dataclass(frozen=True)
+class Looks:
+    """A selection and how it is shown; another one is made for every change."""
+
+    integration: str | None = None
+    heuristic: str | None = None
+    """None: the project's"""
+    rank: int = 0
+    """of the candidate shown, 0 for the best"""
+    stage: str = "chains"
+    dimension: int = 2
+    theme: str = "light"
+    switched: Mapping[tuple[str, str], bool] = field(default_factory=lambda: MappingProxyType({}))
+    """layers switched on or off by hand, by stage and layer"""
+    picked: Pick | None = None
+    """the segment that was clicked"""
+    notice: str = ""
+    """what the last action did, for people"""
+    fits: int = 0
+    """how often somebody asked to see everything"""
+
+    @property
+    def shown(self) -> dict[str, bool]:
+        """The layers of this stage that were switched by hand."""
+        return {layer: on for (stage, layer), on in self.switched.items() if stage == self.stage}
+
+    def at(self, integration: str | None, heuristic: str | None = None, rank: int = 0) -> Looks:
+        """The same view of another integration, or of another candidate of it."""
+        return replace(self, integration=integration, heuristic=heuristic, rank=rank, picked=None, notice="")
+
+    def switch(self, layer: str, on: bool) -> Looks:
+        """With a layer of this stage drawn or not."""
+        return replace(self, switched=MappingProxyType({**self.switched, (self.stage, layer): on}))

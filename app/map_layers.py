@@ -1,0 +1,152 @@
+"""The layers of the merged map, and of the space of poses, each a function from content to drawables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from app.content import Content, Placed
+from app.drawables import Array32, Drawable, label, lift, lines, points
+from app.palette import RGB
+from segmap.integration import Candidate
+from segmap.pose import FloatArray
+from segmap.scans import ScanId
+
+__all__ = ["candidate_points", "component_colour", "components", "pair_in_map", "trajectory"]
+
+COMPONENT_COLOURS = (2, 6, 3, 5, 4)
+"""of the palette's chains; its blue and orange are the pair's"""
+HEIGHT = 0.5
+"""height of a full turn in the space of poses, as a share of the width of what is drawn"""
+BAR = 0.2
+"""height of the best value, as a share of the same"""
+FLOOR = 0.05
+"""gap between the plane and the space of poses, as a share of the same"""
+
+
+def component_colour(content: Content, place: int) -> RGB:
+    """The colour of a component: the first is neutral, as the pair is shown in colour on it."""
+    if place == 0:
+        return content.palette.neutral
+    return content.palette.chain(COMPONENT_COLOURS[(place - 1) % len(COMPONENT_COLOURS)])
+
+
+def components(content: Content) -> Iterator[Drawable]:
+    """The merged map, one drawable for each component."""
+    for place, placed in enumerate(content.placed):
+        colour = component_colour(content, place)
+        name = f"component {placed.component.name}"
+        coordinates = placed.map.coordinates
+        rows = np.arange(len(coordinates))
+        yield Drawable(
+            name, "map", "lines", lines(coordinates), colour, "map", 3, 2.0, source=placed.component.name, segments=rows
+        )
+        if len(content.placed) > 1:
+            yield label(f"{name}/label", "map", placed.component.name, _corner(placed), colour, "map", 12)
+
+
+def _corner(placed: Placed) -> tuple[float, float]:
+    left, _, _, top = placed.map.bounds or (0.0, 0.0, 0.0, 0.0)
+    return left, top
+
+
+def trajectory(content: Content) -> Iterator[Drawable]:
+    """Where the sensor stood, scan after scan, in each component."""
+    for place, placed in enumerate(content.placed):
+        colour = component_colour(content, place)
+        stops = np.array([[p.x, p.y] for p in map(placed.pose, sorted(placed.component.scans))])
+        name = f"trajectory {placed.component.name}"
+        steps = np.concatenate((stops[:-1], stops[1:]), axis=1)
+        yield Drawable(name, "trajectory", "lines", lines(steps), content.palette.faint(colour, 0.6), "map", 8, 1.5)
+        yield Drawable(f"{name}/stops", "trajectory", "points", points(stops), colour, "map", 9, 5.0)
+
+
+def pair_in_map(content: Content) -> Iterator[Drawable]:
+    """The selected scans, highlighted where the merged map has them."""
+    if content.pair is None:
+        return
+    palette = content.palette
+    sides = zip(
+        ("first", "second"),
+        content.pair.scans,
+        content.pair.maps,
+        content.pair.names,
+        (palette.first, palette.second),
+        strict=True,
+    )
+    for name, scan, segment_map, title, colour in sides:
+        placed = _home(content, scan)
+        if placed is not None:
+            pose = placed.pose(scan)
+            moved = segment_map.moved(pose).coordinates
+            yield Drawable(f"pair/{name}", "pair", "lines", lines(moved), colour, "map", 5, 3.5)
+            yield label(f"pair/{name}/label", "pair", title, (pose.x, pose.y), colour, "map", 12)
+
+
+def _home(content: Content, scan: ScanId) -> Placed | None:
+    """The component that has a scan."""
+    return next((p for p in content.placed if scan in p.component.poses), None)
+
+
+# --- the space of poses ---------------------------------------------------------------------------
+
+
+def candidate_points(content: Content) -> Iterator[Drawable]:
+    """Ranked candidates at (x, y, theta), each with a bar as high as its value; in the plane only (x, y)."""
+    pair = content.pair
+    if pair is None or not pair.ranked:
+        return
+    palette, places = content.palette, _places(content, pair.ranked)
+    values = np.array([c.value for c in pair.ranked])
+    colours = palette.by_value((values - values.min()) / (np.ptp(values) or 1.0))
+    yield Drawable("candidates/points", "candidates", "points", places, palette.neutral, "first", 13, 8.0, colours)
+    if content.dimension == 3:
+        yield from _bars(content, places, values / values.max())
+        yield from _turn_axis(content, places)
+    if pair.candidate is not None:
+        yield from _shown(content, _places(content, (pair.candidate,))[0])
+
+
+def _width(content: Content) -> float:
+    left, bottom, right, top = content.bounds or (0.0, 0.0, 10.0, 10.0)
+    return max(right - left, top - bottom)
+
+
+def _places(content: Content, candidates: tuple[Candidate, ...]) -> Array32:
+    poses = np.array([tuple(c.T_1_2) for c in candidates])
+    return lift(poses[:, :2], _heights(poses[:, 2], content) if content.dimension == 3 else 0.0)
+
+
+def _heights(thetas: ArrayLike, content: Content) -> FloatArray:
+    turns = (np.asarray(thetas, dtype=np.float64) + math.pi) / (2.0 * math.pi)
+    return _width(content) * (FLOOR + HEIGHT * turns)
+
+
+def _bars(content: Content, places: Array32, shares: FloatArray) -> Iterator[Drawable]:
+    tops = places.copy()
+    tops[:, 2] += _width(content) * BAR * shares
+    colour = content.palette.values[len(content.palette.values) // 2]
+    yield Drawable("candidates/bars", "candidates", "lines", np.stack((places, tops), axis=1), colour, depth=13)
+
+
+def _turn_axis(content: Content, places: Array32) -> Iterator[Drawable]:
+    """The axis of theta, beside the candidates."""
+    colour = content.palette.neutral
+    corner = places[:, :2].min(axis=0) - 0.05 * _width(content)
+    ends = lift(np.stack((corner, corner)), _heights([-math.pi, math.pi], content))
+    yield Drawable("candidates/axis", "candidates", "lines", ends[None], colour, depth=13, thickness=1.5)
+    for degrees in (-180, 0, 180):
+        at = (*corner, float(_heights(math.radians(degrees), content)))
+        yield label(f"candidates/axis {degrees}", "candidates", f"θ = {degrees}°", at, colour, depth=13)
+
+
+def _shown(content: Content, at: Array32) -> Iterator[Drawable]:
+    """A mark on the candidate that is shown, and a stem down to the plane."""
+    colour = content.palette.accent
+    yield Drawable("candidates/shown", "candidates", "points", at[None], colour, depth=14, thickness=12.0)
+    if content.dimension == 3:
+        stem = np.stack((lift(at[:2]), at))
+        yield Drawable("candidates/stem", "candidates", "lines", stem[None], colour, depth=13, thickness=1.5)

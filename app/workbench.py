@@ -1,0 +1,334 @@
+"""One page's view of a project: what it looks at, and what its buttons do (no viser).
+
+The session holds the truth. A view holds one immutable :class:`~app.looks.Looks`; actions replace it,
+one after the other, and everybody who subscribed is told: ``{"type": "view", **snapshot}``. Session
+events take none of the view's locks, so a session may send them while it holds its own.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from app.actions import perform
+from app.content import Content
+from app.drawables import Pick
+from app.drawing import LAYERS, STAGES, Picture, draw
+from app.errors import RequestError, UnknownError
+from app.evidence import Evidence
+from app.listeners import Listeners
+from app.looks import Looks
+from app.palette import THEMES
+from app.picking import nearest
+from app.review import Row
+from app.snapshot import snapshot
+from segmap.candidates import HEURISTICS
+from segmap.errors import ProjectError
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+__all__ = ["View"]
+
+DOUBLE_CLICK_SECONDS = 0.35
+"""a decision so soon after the last one was meant for the pair that has just gone"""
+RELEVANT = ("decision", "map", "parameters")
+"""session events after which a view may look different"""
+
+
+class View:
+    """What one page shows of a session. Thread-safe; actions raise SegmapError with a sentence for people."""
+
+    def __init__(self, session: Session, *, who: str = "", clock: Callable[[], float] = time.monotonic) -> None:
+        self.session = session
+        self.who = who
+        self._clock, self._decided_at = clock, -DOUBLE_CLICK_SECONDS
+        self._evidence = Evidence(session)
+        self._acting = threading.RLock()
+        self._looks = Looks()
+        self._listeners = Listeners()
+        self.subscribe = self._listeners.add
+        self._seen = session.state.revision
+        self._unsubscribe = session.subscribe(self._hear)
+        rows = session.rows()
+        if rows:
+            self.select(rows[0].id)
+
+    # --- what is shown ----------------------------------------------------------------------------
+
+    @property
+    def looks(self) -> Looks:
+        """What is looked at now."""
+        return self._looks
+
+    def content(self) -> Content:
+        """All that the picture is made from, now."""
+        return self._evidence.content(self._looks)
+
+    def picture(self) -> Picture:
+        """What is to be drawn now."""
+        return draw(self.content())
+
+    def snapshot(self) -> dict[str, Any]:
+        """What the panel and the page show now, as JSON."""
+        looks = self._looks
+        return snapshot(self.session, self._evidence, looks, self._evidence.content(looks))
+
+    def close(self) -> None:
+        """Stop listening to the session."""
+        self._unsubscribe()
+
+    # --- choosing what to look at -----------------------------------------------------------------
+
+    def select(self, integration: str) -> None:
+        """Look at an integration: at the candidate that was decided on, or else at the best.
+
+        Raises:
+            UnknownError: the project has no such integration.
+        """
+        with self._acting:
+            self._look(self._at(integration))
+
+    def _at(self, integration: str, notice: str = "") -> Looks:
+        if integration not in self.session.integrations:
+            raise UnknownError(f"The project has no integration {integration[:80]!r}.")
+        decision = self.session.state.decisions.get(integration)
+        heuristic = decision.heuristic if decision and decision.heuristic in HEURISTICS else None
+        rank = (decision.candidate or 0) if decision else 0
+        return replace(self._looks.at(integration, heuristic, rank), notice=notice)
+
+    def next(self) -> None:
+        """The next integration of the queue; after the last comes the first."""
+        self._step(1)
+
+    def previous(self) -> None:
+        """The integration before this one in the queue."""
+        self._step(-1)
+
+    def _step(self, step: int) -> None:
+        with self._acting:
+            ids = [row.id for row in self.session.rows()]
+            if ids:
+                place = ids.index(self._looks.integration) if self._looks.integration in ids else -step
+                self.select(ids[(place + step) % len(ids)])
+
+    def next_candidate(self) -> None:
+        """The candidate with the next lower value."""
+        self.set_candidate(self._rank() + 1)
+
+    def previous_candidate(self) -> None:
+        """The candidate with the next higher value."""
+        self.set_candidate(self._rank() - 1)
+
+    def set_candidate(self, rank: int) -> None:
+        """Look at the candidate of a rank, 0 for the best; beyond the ends the last one stays."""
+        with self._acting:
+            last = max(0, self._count() - 1)
+            self._change(rank=min(max(0, rank), last), picked=None)
+
+    def _count(self) -> int:
+        match = self._evidence.match(self._looks)
+        return len(match.ranked) if match else 0
+
+    def _rank(self) -> int:
+        return min(self._looks.rank, max(0, self._count() - 1))
+
+    def next_heuristic(self) -> None:
+        """What the next heuristic finds on this pair; after the last comes the first."""
+        self._turn_heuristic(1)
+
+    def previous_heuristic(self) -> None:
+        """What the heuristic before this one finds on this pair."""
+        self._turn_heuristic(-1)
+
+    def _turn_heuristic(self, step: int) -> None:
+        with self._acting:
+            place = HEURISTICS.index(self._evidence.heuristic(self._looks))
+            self.set_heuristic(HEURISTICS[(place + step) % len(HEURISTICS)])
+
+    def set_heuristic(self, heuristic: str) -> None:
+        """Look at what a heuristic finds on this pair; the project's heuristic stays what it is."""
+        _known(heuristic, HEURISTICS, "heuristic")
+        with self._acting:
+            self._look(self._looks.at(self._looks.integration, heuristic))
+
+    def set_stage(self, stage: str) -> None:
+        """Look at a stage, one of STAGES."""
+        _known(stage, STAGES, "stage")
+        self._change(stage=stage, picked=None)
+
+    def next_stage(self) -> None:
+        """The next stage; the last stays."""
+        self._turn_stage(1)
+
+    def previous_stage(self) -> None:
+        """The stage before this one; the first stays."""
+        self._turn_stage(-1)
+
+    def _turn_stage(self, step: int) -> None:
+        with self._acting:
+            place = STAGES.index(self._looks.stage) + step
+            self.set_stage(STAGES[min(max(0, place), len(STAGES) - 1)])
+
+    # --- how to look at it ------------------------------------------------------------------------
+
+    def toggle_layer(self, layer: str) -> None:
+        """Draw a layer of this stage, or stop drawing it."""
+        _known(layer, LAYERS, "layer")
+        with self._acting:
+            shown = {one.name: one.visible for one in self.picture().layers}
+            if layer in shown:
+                self._look(self._looks.switch(layer, not shown[layer]))
+
+    def set_dimension(self, dimension: int) -> None:
+        """Look straight down (2) or from the side (3)."""
+        _known(dimension, (2, 3), "dimension")
+        self._change(dimension=dimension)
+
+    def toggle_dimension(self) -> None:
+        """From 2D to 3D, or back."""
+        with self._acting:
+            self.set_dimension(5 - self._looks.dimension)
+
+    def set_theme(self, theme: str) -> None:
+        """Draw on a light or on a dark background."""
+        _known(theme, THEMES, "theme")
+        self._change(theme=theme)
+
+    def fit(self) -> None:
+        """Bring everything into sight."""
+        with self._acting:
+            self._change(fits=self._looks.fits + 1)
+
+    def pick(self, x: float, y: float, reach: float) -> None:
+        """Look at the segment nearest to a place, at most ``reach`` metres away; at none if none is there."""
+        self._change(picked=nearest(self.picture(), float(x), float(y), float(reach)))
+
+    def set_picked(self, source: str | None, segment: int = 0) -> None:
+        """Look at a segment: of ``first``, of ``second``, of a component of the map; None: at none."""
+        self._change(picked=None if source is None else Pick(source, segment))
+
+    def say(self, notice: str) -> None:
+        """Show a sentence until the next action."""
+        self._change(notice=notice)
+
+    def act(self, action: str, value: Any = None) -> dict[str, Any]:
+        """Do what a page asks for, by name; the snapshot afterwards.
+
+        Raises:
+            RequestError: there is no such action, or it cannot be done with this value.
+        """
+        perform(self, action, value)
+        return self.snapshot()
+
+    # --- deciding ---------------------------------------------------------------------------------
+
+    def accept(self, integration: str | None = None) -> None:
+        """Accept the candidate shown and go on to the next pending integration.
+
+        With ``integration``, only if that is the one looked at: so that a late click decides nothing else.
+        """
+        self._decide("accepted", integration)
+
+    def reject(self, integration: str | None = None) -> None:
+        """Reject the integration and go on to the next pending one; ``integration`` as for :meth:`accept`."""
+        self._decide("rejected", integration)
+
+    def skip(self) -> None:
+        """Leave the integration undecided and go on to the next pending one."""
+        with self._acting:
+            self._go_on(self.session.rows(), "")
+
+    def undo(self) -> None:
+        """Take the last step back, and look at what it was about."""
+        self._turn_back(self.session.undo, self.session.state.can_undo, "Undone")
+
+    def redo(self) -> None:
+        """Do again what was undone, and look at what it is about."""
+        self._turn_back(self.session.redo, self.session.state.can_redo, "Redone")
+
+    def _decide(self, verdict: str, integration: str | None) -> None:
+        with self._acting:
+            if self._late(integration):
+                return
+            looks, rows = self._looks, self.session.rows()
+            if looks.integration is None:
+                raise ProjectError("There is no pair to decide on.")
+            if verdict == "accepted" and not self._count():
+                raise ProjectError(
+                    "There is no transformation to accept: reject the pair, skip it, or try another heuristic."
+                )
+            self.session.decide(
+                [looks.integration],
+                verdict,
+                candidate=self._rank() if self._count() else None,
+                heuristic=self._evidence.heuristic(looks),
+                who=self.who,
+                expected_revision=self._seen,
+            )
+            self._decided_at = self._clock()
+            self._go_on(rows, f"{verdict.capitalize()}: {looks.integration}.")
+
+    def _late(self, integration: str | None) -> bool:
+        """Whether a click came for a pair that has gone already."""
+        if integration is not None:
+            return integration != self._looks.integration
+        return self._clock() - self._decided_at < DOUBLE_CLICK_SECONDS
+
+    def _go_on(self, before: Sequence[Row], notice: str) -> None:
+        following = self._following(before)
+        if following is None:
+            self.say(f"{notice} No other pair waits for a decision.".strip())
+        else:
+            self._look(self._at(following, notice))
+
+    def _following(self, order: Sequence[Row]) -> str | None:
+        """The next integration that waits for a decision, in the order the person saw."""
+        waiting = {row.id for row in self.session.rows() if row.state == "pending"}
+        ids = [row.id for row in order]
+        place = ids.index(self._looks.integration) + 1 if self._looks.integration in ids else 0
+        return next((id for id in ids[place:] + ids[:place] if id in waiting and id != self._looks.integration), None)
+
+    def _turn_back(self, turn: Callable[..., Any], what: str | None, done: str) -> None:
+        with self._acting:
+            before = self.session.state.decisions
+            turn(self.who)
+            after = self.session.state.decisions
+            changed = [id for id in self.session.integrations if before.get(id) != after.get(id)]
+            here = self._looks.integration
+            target = here if here in changed or not changed else changed[0]
+            looks = self._looks if target is None else self._at(target)
+            self._look(replace(looks, notice=f"{done}: {what}."))
+
+    # --- keeping in step --------------------------------------------------------------------------
+
+    def _change(self, **changes: Any) -> None:
+        with self._acting:
+            self._look(replace(self._looks, **{"notice": "", **changes}))
+
+    def _look(self, looks: Looks) -> None:
+        """Look at something else, and tell everybody."""
+        self._looks = looks
+        self._tell()
+
+    def _hear(self, event: Mapping[str, Any]) -> None:
+        """A session event: a match for what is looked at, or a change of what is decided."""
+        kind = event.get("type")
+        if kind in RELEVANT or (kind == "match" and event.get("integration") == self._looks.integration):
+            self._tell()
+
+    def _tell(self) -> None:
+        """Have what is looked at computed where it is not known, and tell everybody what there is."""
+        looks = self._looks
+        if looks.integration is not None and self._evidence.unknown(looks):
+            self.session.request(looks.integration, self._evidence.heuristic(looks))
+        self._seen = self.session.state.revision
+        self._listeners.tell({"type": "view", **self.snapshot()})
+
+
+def _known(value: object, among: Sequence[object], what: str) -> None:
+    if value not in among:
+        raise RequestError(f"There is no {what} {str(value)[:80]!r}: take one of {', '.join(map(str, among))}.")
