@@ -5,9 +5,8 @@ import { count, whole } from "./format.js";
 import { failed } from "./notices.js";
 
 /** Keep the bar up to date and its buttons working. */
-export function head(project) {
-  byId("undo").addEventListener("click", () => project.undo().catch(failed));
-  byId("redo").addEventListener("click", () => project.redo().catch(failed));
+export function head(project, view) {
+  for (const way of ["undo", "redo"]) byId(way).addEventListener("click", () => view.act(way).catch(failed));
   byId("matching-action").addEventListener("click", () => project.matching(byId("matching-action").value).catch(failed));
   project.addEventListener("info", () => information(project.info));
   project.addEventListener("progress", () => progress(project.info.progress));

@@ -3,6 +3,7 @@
 import { get, post } from "./api.js";
 
 const MATCHING_PAUSE = 700;
+const REDRAW_PAUSE = 250;
 const DECISION_PAUSE = 60;
 
 /** Tells "info", "rows", "progress", "match", "parameters" and "trouble" as events. */
@@ -16,6 +17,7 @@ export class Project extends EventTarget {
     this.index = new Map();
     this.refreshInfo = coalesced(() => this.#loadInfo(), (error) => this.tell("trouble", error));
     this.refreshRows = coalesced(() => this.#loadRows(), (error) => this.tell("trouble", error));
+    this.redraw = coalesced(async () => this.tell("rows"));
   }
 
   load() {
@@ -53,10 +55,6 @@ export class Project extends EventTarget {
     return this.#change("undo");
   }
 
-  redo() {
-    return this.#change("redo");
-  }
-
   setParameters(body) {
     return this.#change("parameters", body);
   }
@@ -71,7 +69,8 @@ export class Project extends EventTarget {
     if (event.type === "match") this.#matched(event);
     else if (event.type === "progress") this.#progressed(event);
     else if (event.type === "parameters") this.refresh(), this.tell("parameters");
-    else if (event.type === "decision" || event.type === "log") this.refresh();
+    else if (event.type === "decision") this.#decided(event);
+    else if (event.type === "log") this.refresh();
     else if (event.type === "map") this.refreshInfo(), this.tell("map");
     else if (event.type === "error") this.tell("trouble", new Error(event.message));
   }
@@ -105,12 +104,21 @@ export class Project extends EventTarget {
 
   /** A match was found: show it in its place at once, and the new order when there is time. */
   #matched(event) {
-    if (event.row && this.index.has(event.integration)) {
-      Object.assign(this.index.get(event.integration), event.row);
-      this.tell("rows");
-    }
+    this.#put(event.row ? [event.row] : []);
+    this.redraw(REDRAW_PAUSE);
     this.refresh(MATCHING_PAUSE);
     this.tell("match", event);
+  }
+
+  #decided(event) {
+    this.#put(event.rows ?? []);
+    this.redraw(0);
+    this.refresh();
+  }
+
+  /** Newer rows, each in the place it has. */
+  #put(rows) {
+    for (const row of rows) Object.assign(this.index.get(row.id) ?? {}, row);
   }
 
   #progressed(event) {
@@ -121,7 +129,7 @@ export class Project extends EventTarget {
 }
 
 /** Run `work` soon, but never twice at the same time and not again before a pause; calls in between become one. */
-function coalesced(work, failed) {
+function coalesced(work, failed = () => {}) {
   let [timer, busy, finished, pause] = [0, false, -Infinity, Infinity];
   const run = async () => {
     [busy, pause] = [true, Infinity];

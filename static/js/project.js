@@ -32,7 +32,7 @@ async function start() {
   new Detail(project, view, [candidates, new Heuristics(project)]);
   new Threshold(project, queue);
   new ParameterDrawer(project);
-  for (const part of [head, summary, exportMenu]) part(project);
+  for (const part of [head, summary, exportMenu]) part(project, view);
   project.addEventListener("trouble", ({ detail }) => failed(detail));
   keyboard();
   await project.load();
@@ -93,9 +93,10 @@ function keyboard() {
   sheet(byId("help"));
   byId("help-open").addEventListener("click", help);
   const act = (action) => () => view.act(action).catch(failed);
-  const actions = { next: () => queue.step(1), previous: () => queue.step(-1), search, help };
+  const actions = { next: () => queue.turn(1), previous: () => queue.turn(-1), search, help };
   for (const name of ["undo", "redo"]) actions[name] = () => byId(name).disabled || byId(name).click();
-  for (const name of ["skip", "accept", "reject", "toggle_dimension"]) actions[name] = act(name);
+  for (const name of ["accept", "reject"]) actions[name] = () => view.act(name, view.integration).catch(failed);
+  for (const name of ["skip", "toggle_dimension"]) actions[name] = act(name);
   for (const what of ["candidate", "heuristic", "stage"]) {
     for (const way of ["next", "previous"]) actions[`${way}_${what}`] = act(`${way}_${what}`);
   }

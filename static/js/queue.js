@@ -62,11 +62,21 @@ export class Queue {
     this.list.show(this.#shown, this.view.integration);
   }
 
-  /** Select the row `steps` further down; with nothing selected, or out of the filter, the first. */
+  /** Select the row `steps` further down, at most the last; where the selection is filtered out, the first. */
   step(steps) {
-    const at = this.#shown.findIndex((row) => row.id === this.view.integration);
+    const at = this.#at;
     const wanted = at < 0 ? 0 : Math.min(this.#shown.length - 1, Math.max(0, at + steps));
     if (this.#shown[wanted]) this.select(this.#shown[wanted].id);
+  }
+
+  /** Select the next or previous row; after the last comes the first. */
+  turn(step) {
+    const [at, length] = [this.#at, this.#shown.length];
+    if (length) this.select(this.#shown[at < 0 ? 0 : (at + step + length) % length].id);
+  }
+
+  get #at() {
+    return this.#shown.findIndex((row) => row.id === this.view.integration);
   }
 
   select(id) {

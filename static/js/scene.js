@@ -10,8 +10,15 @@ export function scene(view, keys) {
   view.addEventListener("opened", () => {
     cover("Loading the scene…");
     frame.src = DARK.matches ? `${view.scene}?darkMode` : view.scene;
+    theme(view);
   });
+  DARK.addEventListener("change", () => theme(view));
   frame.addEventListener("load", () => loaded(frame, keys));
+}
+
+/** The colours of the scene follow the browser's, as those of the page do. */
+function theme(view) {
+  view.act("set_theme", DARK.matches ? "dark" : "light").catch((error) => view.project.tell("trouble", error));
 }
 
 /** Cover the scene with a sentence, or uncover it. */

@@ -2,9 +2,13 @@
 
 import { get, post } from "./api.js";
 
+const SETTLE = 30;
+
 /** Tells "opened" (there is a new scene) and "changed" (the snapshot) as events. */
 export class View extends EventTarget {
   #sending = 0;
+  #queue = Promise.resolve();
+  #heard = 0;
   #wanted = null;
 
   constructor(project) {
@@ -24,19 +28,17 @@ export class View extends EventTarget {
     this.id = id;
     this.scene = scene;
     this.dispatchEvent(new Event("opened"));
-    if (integration && this.project.row(integration)) await this.act("select", integration);
-    else this.apply(await get(this.#url));
+    const known = integration && this.project.row(integration);
+    this.apply(known ? await post(this.#url, { action: "select", value: integration }) : await get(this.#url));
   }
 
-  /** Ask for a change; a view the server no longer has is opened again first. */
-  async act(action, value = null) {
+  /** Ask for a change, one after the other; a view the server no longer has is opened again first. */
+  act(action, value = null) {
     this.#sending += 1;
-    try {
-      const snapshot = await this.#post(action, value);
-      if (this.#sending === 1) this.apply(snapshot);
-    } finally {
-      this.#sending -= 1;
-    }
+    const sent = this.#queue.then(() => this.#post(action, value));
+    const done = sent.then((snapshot) => this.#sending === 1 && this.apply(snapshot)).finally(() => (this.#sending -= 1));
+    this.#queue = done.catch(() => {});
+    return done;
   }
 
   /** Select an integration: shown at once; of many quick selections only the last is sent. */
@@ -51,9 +53,10 @@ export class View extends EventTarget {
     }
   }
 
-  /** A snapshot that came by itself: the scene's own panel was used. Older ones than a pending action are not taken. */
+  /** A snapshot that came by itself: the scene's own panel was used. Of several, and beside an action, the last counts. */
   hear(snapshot) {
-    if (this.#sending === 0) this.apply(snapshot);
+    clearTimeout(this.#heard);
+    this.#heard = setTimeout(() => this.#sending === 0 && this.apply(snapshot), SETTLE);
   }
 
   apply(snapshot) {
