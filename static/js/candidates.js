@@ -10,7 +10,7 @@ const COLUMNS = [
   { label: "x", title: "metres", of: (c) => c.pose.x, show: (c) => fixed(c.pose.x, 2) },
   { label: "y", title: "metres", of: (c) => c.pose.y, show: (c) => fixed(c.pose.y, 2) },
   { label: "θ°", title: "degrees", of: (c) => c.pose.theta, show: (c) => degrees(c.pose.theta) },
-  { label: "angles", title: "the segments whose angles it superimposes: of the first map, of the second map", of: (c) => c.angle_1[0], show: (c) => `${c.angle_1.join("·")} → ${c.angle_2.join("·")}` },
+  { label: "angles", title: "the segments of the first and of the second map whose angles meet", of: (c) => c.angle_1[0], show: angles },
 ];
 
 export class Candidates {
@@ -88,6 +88,10 @@ export class Candidates {
     event.preventDefault();
     this.#choose(next);
   }
+}
+
+function angles({ angle_1: first, angle_2: second }) {
+  return `${first.join("·")} → ${second.join("·")}`;
 }
 
 /** Scroll the panel, and only the panel, until the row is in sight below the sticky head. */

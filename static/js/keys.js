@@ -42,14 +42,15 @@ export function listen(actions) {
   });
 }
 
+const CAMERA =
+  "The same keys work in the scene, after a click into it. W A S D Q E and the arrows move its camera; drag to pan, scroll to zoom.";
 const DELIBERATE = new Set(["accept", "reject", "undo", "redo", "skip"]);
 
 /** Fill the help sheet. */
 export function sheet(dialog) {
   const groups = KEYS.map(([title, keys]) => h("section", {}, h("h3", {}, title), h("dl", {}, keys.map(line))));
   const close = h("button.primary", { type: "button", autofocus: true, onclick: () => dialog.close() }, "Close");
-  const note = h("p.muted", {}, "The same keys work in the scene, after a click into it. W A S D Q E and the arrows move its camera; drag to pan, scroll to zoom.");
-  fill(dialog, h("h2", { id: "help-title" }, "Keyboard"), h("div.groups", {}, groups), note, close);
+  fill(dialog, h("h2", { id: "help-title" }, "Keyboard"), h("div.groups", {}, groups), h("p.muted", {}, CAMERA), close);
 }
 
 function line([key, what]) {

@@ -34,8 +34,8 @@ export class ParameterDrawer {
   async #make() {
     const { parameters, presets } = await get("/api/parameters");
     this.#presets = presets;
-    fill(byId("parameters-preset"), h("option", { value: "" }, "Values of a preset…"), Object.keys(presets).map((name) => h("option", {}, name)));
-    fill(byId("parameters-heuristic"), this.project.info.heuristics.map((name) => h("option", {}, name)));
+    fill(byId("parameters-preset"), h("option", { value: "" }, "Values of a preset…"), options(Object.keys(presets)));
+    fill(byId("parameters-heuristic"), options(this.project.info.heuristics));
     fill(byId("parameters-list"), parameters.map((parameter) => this.#field(parameter)));
   }
 
@@ -45,7 +45,8 @@ export class ParameterDrawer {
     this.#fields.set(parameter.name, { parameter, input });
     const label = h("label", { for: id, title: parameter.name }, words(parameter.name));
     const box = h("div.control", {}, input, parameter.unit && h("span.unit", {}, parameter.unit));
-    return h("li", { "data-name": parameter.name }, label, box, h("p.help", { id: `${id}-help` }, parameter.help, " ", h("span.bounds", {}, bounds(parameter))));
+    const help = h("p.help", { id: `${id}-help` }, parameter.help, " ", h("span.bounds", {}, bounds(parameter)));
+    return h("li", { "data-name": parameter.name }, label, box, help);
   }
 
   #fill() {
@@ -104,10 +105,12 @@ export class ParameterDrawer {
   }
 }
 
+const options = (names) => names.map((name) => h("option", {}, name));
+
 function control(parameter, id) {
   const shared = { id, name: parameter.name, "aria-describedby": `${id}-help` };
   if (parameter.kind === "boolean") return h("input", { type: "checkbox", ...shared });
-  if (parameter.kind === "choice") return h("select", shared, parameter.choices.map((choice) => h("option", {}, choice)));
+  if (parameter.kind === "choice") return h("select", shared, options(parameter.choices));
   const limits = { min: parameter.minimum ?? parameter.above, max: parameter.maximum ?? parameter.below };
   const step = parameter.kind === "integer" ? 1 : "any";
   return h("input", { type: "number", step, placeholder: parameter.optional ? "none" : null, required: !parameter.optional, ...limits, ...shared });
