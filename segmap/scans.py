@@ -18,6 +18,8 @@ __all__ = ["LaserLog", "LaserScan", "LogProblem", "ScanId"]
 
 ALL_ROUND = 2.0 * np.pi
 MAX_BEAMS = 100_000
+FARTHEST = 10_000.0
+"""metres; no laser scanner sees farther, a larger reading is an error in the file"""
 
 
 class ScanId(NamedTuple):
@@ -54,7 +56,7 @@ class LaserScan:
     """One sweep of a planar laser, in the sensor's frame: beam k looks at ``first_angle + k * angle_step``.
 
     ``ranges`` has shape (beams,), metres; NaN stands for a beam without a return. Everything that
-    cannot be a return (0, negative, infinite, at ``max_range`` or beyond) becomes NaN here.
+    cannot be a return (0, negative, infinite or absurd, at ``max_range`` or beyond) becomes NaN here.
 
     Raises:
         ScanError: the ranges are not one row of numbers, or the angles are not finite.
@@ -81,7 +83,7 @@ class LaserScan:
         if self.angle_step == 0.0 and len(ranges) > 1:
             raise ScanError("The angle step of a scan must not be 0.")
         with np.errstate(invalid="ignore"):
-            ranges[~(np.isfinite(ranges) & (ranges > 0.0) & (ranges < self.max_range))] = np.nan
+            ranges[~(np.isfinite(ranges) & (ranges > 0.0) & (ranges < min(self.max_range, FARTHEST)))] = np.nan
         ranges.flags.writeable = False
         object.__setattr__(self, "ranges", ranges)
 

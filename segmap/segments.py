@@ -17,6 +17,9 @@ from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
 from segmap.scans import LaserScan
 
+LEAST_LENGTH = 1e-9
+"""metres; what is shorter is a point"""
+
 __all__ = ["Order", "SegmentMap", "Source", "extract"]
 
 
@@ -135,7 +138,7 @@ def _checked_coordinates(coordinates: ArrayLike) -> FloatArray:
     if not np.isfinite(array).all():
         row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
         raise MapError(f"Segment {row} has a coordinate that is not a finite number.")
-    short = np.flatnonzero((array[:, :2] == array[:, 2:]).all(axis=1))
+    short = np.flatnonzero(np.hypot(*(array[:, 2:] - array[:, :2]).T) <= LEAST_LENGTH)
     if len(short):
         raise MapError(f"Segment {short[0]} has no length: its two extremes are the same point.")
     return array
@@ -156,7 +159,7 @@ def extract(scan: LaserScan, parameters: Parameters, log: int = 0, index: int = 
     chunks = clusters(points, parameters.cluster_distance, scan.all_round)
     coordinates = approximate(chunks, parameters.split_tolerance)
     lengths = np.hypot(*(coordinates[:, 2:] - coordinates[:, :2]).T)
-    coordinates = coordinates[(lengths >= parameters.min_segment_length) & (lengths > 0.0)]
+    coordinates = coordinates[(lengths >= parameters.min_segment_length) & (lengths > LEAST_LENGTH)]
     return SegmentMap(
         coordinates,
         Order.RING if scan.all_round else Order.BEAMS,
@@ -169,6 +172,8 @@ def clusters(points: FloatArray, cluster_distance: float, all_round: bool = Fals
 
     Where the sensor sees all round, a cluster may run over the seam between last and first beam.
     """
+    if not len(points):
+        return []
     gaps = np.hypot(*np.diff(points, axis=0).T) >= cluster_distance
     chunks = np.split(points, np.flatnonzero(gaps) + 1)
     if all_round and len(chunks) > 1 and math.dist(points[-1], points[0]) < cluster_distance:
