@@ -1,0 +1,52 @@
+"""What holds for every format."""
+
+from __future__ import annotations
+
+import pytest
+
+from segmap.errors import ExportError
+from segmap.export import FORMATS, export_map, write_map
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_same_bytes(corner, format):
+    """The same map gives the same bytes, whatever the order of the metadata."""
+    one = export_map([corner], format, {"title": "T", "version": "1"}, ["0.0-0.1"])
+    assert one == export_map([corner], format, {"version": "1", "title": "T"}, ["0.0-0.1"])
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_provenance(corner, format):
+    """Version and hash of the map are in the file."""
+    content = export_map([corner], format, {"version": "0.1.0", "map_hash": "5f3a"}).decode()
+    assert "0.1.0" in content
+    assert "5f3a" in content
+
+
+def test_unknown_format(corner):
+    """A format that is not written is refused with those that are."""
+    with pytest.raises(ExportError, match=r"no export format 'dwg'\. Formats are: geojson, svg\."):
+        export_map([corner], "dwg")
+
+
+def test_write(corner, tmp_path):
+    """A file's suffix says its format; what was there before is replaced."""
+    for name, format in FORMATS.items():
+        path = tmp_path / f"map{format.suffix.upper()}"
+        path.write_text("old")
+        write_map([corner], path, metadata={"title": "T"})
+        assert path.read_bytes() == export_map([corner], name, {"title": "T"})
+    write_map([corner], tmp_path / "map.txt", "svg")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["map.GEOJSON", "map.SVG", "map.txt"]
+
+
+def test_write_refused(corner, tmp_path):
+    """A suffix nobody knows, and a place where nothing can be written, are one sentence each."""
+    with pytest.raises(ExportError, match=r"map\.txt does not say its format: let the name end in one of \.geojson"):
+        write_map([corner], tmp_path / "map.txt")
+    with pytest.raises(ExportError, match="cannot be written: no such file or directory"):
+        write_map([corner], tmp_path / "missing" / "map.svg")
+    (tmp_path / "folder.svg").mkdir()
+    with pytest.raises(ExportError, match="cannot be written"):
+        write_map([corner], tmp_path / "folder.svg")
+    assert [path.name for path in tmp_path.iterdir()] == ["folder.svg"]
