@@ -11,6 +11,7 @@ import math
 import os
 import zlib
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path, PurePosixPath
@@ -27,7 +28,7 @@ GZIP = b"\x1f\x8b"
 HEAD = 1 << 20
 """bytes a format may look at to recognise a file"""
 PIECE = 1 << 13
-"""compressed bytes taken at a time: what is lost where the data are damaged"""
+"""compressed bytes taken at a time"""
 HARMLESS = 1 << 24
 """decompressed bytes below which the ratio does not matter"""
 MEBIBYTE = 1 << 20
@@ -217,17 +218,22 @@ class _Inflated:
             if self._inflate.eof and not self._next_member():
                 break
             data = self._waiting or self._compressed.take(PIECE)
-            try:
-                piece = self._inflate.decompress(data, size)
-            except zlib.error:
-                self.damage = "damaged"
-                break
-            self._waiting = self._inflate.unconsumed_tail
+            piece = self._decompressed(data, size)
             if piece:
                 return piece
             if not data and not self._inflate.eof:
                 self.damage = "cut off"
         return b""
+
+    def _decompressed(self, data: bytes, size: int) -> bytes:
+        before = self._inflate.copy()
+        try:
+            piece: bytes = self._inflate.decompress(data, size)
+        except zlib.error:
+            self.damage = "damaged"
+            return _up_to_damage(before, data, size)
+        self._waiting = self._inflate.unconsumed_tail
+        return piece
 
     def _next_member(self) -> bool:
         rest = self._inflate.unused_data.lstrip(b"\0")
@@ -241,3 +247,14 @@ class _Inflated:
 
 def _inflater() -> Any:
     return zlib.decompressobj(wbits=16 + zlib.MAX_WBITS)
+
+
+def _up_to_damage(inflate: Any, data: bytes, size: int) -> bytes:
+    """What comes out of damaged data before the first byte that makes no sense."""
+    saved = b""
+    with suppress(zlib.error):
+        for byte in data:
+            saved += inflate.decompress(bytes((byte,)), max(size - len(saved), 1))
+            if len(saved) >= size:
+                break
+    return saved[:size]
