@@ -1,10 +1,14 @@
-"""Where the pages and the sample logs lie: beside the packages in a checkout, inside ``app`` when installed."""
+"""What comes with the program: the pages, the sample logs, the version.
+
+The folders lie beside the packages in a checkout and inside ``app`` when installed.
+"""
 
 from __future__ import annotations
 
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-__all__ = ["samples_folder", "static_folder"]
+__all__ = ["program_version", "samples_folder", "static_folder"]
 
 PACKAGE = Path(__file__).resolve().parent
 
@@ -17,6 +21,14 @@ def static_folder() -> Path:
 def samples_folder() -> Path:
     """The folder of the sample logs."""
     return _folder("sample_logs")
+
+
+def program_version() -> str:
+    """The version of segmap; ``unknown`` where it runs without being installed."""
+    try:
+        return version("segmap")
+    except PackageNotFoundError:
+        return "unknown"
 
 
 def _folder(name: str) -> Path:

@@ -1,0 +1,86 @@
+"""Files that come in -> a project file."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+from app.inputs import facts_of, remember
+from segmap.errors import LogError
+from segmap.logs import base_name, read_log
+from segmap.project import ProjectState
+from segmap.scans import LaserLog
+from segmap.store import Store
+
+__all__ = ["Filled", "Source", "copy_project", "fill", "is_project"]
+
+SQLITE = b"SQLite format 3\0"
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file as it came: its name, which is only ever shown, and its bytes, to be read from the start."""
+
+    name: str
+    file: BinaryIO
+
+
+@dataclass
+class Filled:
+    """What went into a new project: the logs as read, and what was left out of them."""
+
+    logs: dict[int, LaserLog] = field(default_factory=dict)
+    problems: tuple[str, ...] = ()
+
+
+def is_project(file: BinaryIO) -> bool:
+    """Whether a file is a database, as projects are; found by content, not by name."""
+    start = file.read(len(SQLITE))
+    file.seek(0)
+    return start == SQLITE
+
+
+def fill(path: Path, title: str, sources: Sequence[Source]) -> Filled:
+    """A new project file at ``path`` with all logs that can be read.
+
+    Raises:
+        LogError: none can be.
+    """
+    logs, failures = _read(sources)
+    if not logs:
+        raise LogError(" ".join(failures))
+    filled = Filled(problems=tuple(failures))
+    with Store.create(path, title) as store:
+        for source, log in logs:
+            source.file.seek(0)
+            info = store.add_log(log.name, source.file, scans=len(log), format=log.format)
+            remember(store, info.sha256, facts_of(log))
+            filled.logs[info.index] = log
+            filled.problems += tuple(f"{log.name}, {problem}" for problem in log.problems)
+    return filled
+
+
+def _read(sources: Sequence[Source]) -> tuple[list[tuple[Source, LaserLog]], list[str]]:
+    logs, failures = [], []
+    for source in sources:
+        source.file.seek(0)
+        try:
+            logs.append((source, read_log(source.file, base_name(source.name))))
+        except LogError as error:
+            failures.append(str(error))
+    return logs, failures
+
+
+def copy_project(file: BinaryIO, path: Path) -> ProjectState:
+    """A project file that came in, checked, as a new file at ``path``.
+
+    Raises:
+        ProjectError: it is not a project, is damaged, or is from a newer version.
+    """
+    with path.open("xb") as target:
+        shutil.copyfileobj(file, target)
+    with Store.open(path) as store:
+        return store.state

@@ -1,0 +1,271 @@
+"""The matches of a project: found in the background, kept in its file, shown only under the parameters they are for."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
+
+from pydantic import TypeAdapter
+
+from app.jobs import Backlog, Check
+from app.review import Outcome
+from segmap.candidates import HEURISTICS
+from segmap.errors import CancelledError, SegmapError
+from segmap.integration import Match
+from segmap.parameters import Parameters
+
+__all__ = ["Matching", "Progress", "Settings", "Task"]
+
+MATCHES_IN_MEMORY = 256
+IRRELEVANT = frozenset({"value_threshold", "fusion_tolerance", "fusion_variant", "fusion_bound", "pivot_form"})
+"""parameters no candidate's value depends on"""
+OWN = {
+    "consecutive": {"segment_length_percentage", "consecutive_over_short", "consecutive_strict"},
+    "random": {"segment_division_factor", "random_rounds", "seed", "good_enough"},
+    "histogram": {"histogram_slots"},
+}
+"""parameters that matter to one heuristic only"""
+
+log = logging.getLogger(__name__)
+_OUTCOME = TypeAdapter(Outcome)
+
+
+class ResultStore(Protocol):
+    """The cache of results in a project file."""
+
+    def put_result(self, key: str, text: str) -> None: ...
+    def put_results(self, texts: Mapping[str, str]) -> None: ...
+    def get_result(self, key: str) -> str | None: ...
+    def results(self, keys: Iterable[str]) -> Mapping[str, str]: ...
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What every match depends on, beside the two scans and the heuristic."""
+
+    parameters: Parameters
+    mode: str
+
+    def key(self, heuristic: str) -> str:
+        """The same for settings under which a heuristic finds the same."""
+        foreign = {name for other, names in OWN.items() if other != heuristic for name in names}
+        relevant = self.parameters.model_dump(mode="json", exclude=set(IRRELEVANT | foreign))
+        told = json.dumps([self.mode, heuristic, relevant], sort_keys=True)
+        return hashlib.sha256(told.encode()).hexdigest()[:24]
+
+
+@dataclass(frozen=True)
+class Task:
+    """One match to be found; equal tasks have equal results."""
+
+    integration: str
+    heuristic: str
+    key: str
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far matching is."""
+
+    done: int
+    total: int
+    running: int
+    cancelled: bool
+    message: str
+
+    def to_json(self) -> dict[str, Any]:
+        """As the pages get it."""
+        return asdict(self)
+
+
+class Matching:
+    """Finds the matches of a list of integrations, those asked for first, and keeps them.
+
+    ``find`` does the matching; ``told`` hears of each new outcome, ``changed`` of progress.
+    """
+
+    def __init__(
+        self,
+        store: ResultStore,
+        integrations: Sequence[str],
+        find: Callable[[str, str, Settings, Check], Match],
+        *,
+        told: Callable[[str, str], None],
+        changed: Callable[[], None],
+        prepare: Callable[[Check], None] | None = None,
+        workers: int = 1,
+    ) -> None:
+        self._store, self._integrations, self._find, self._told = store, tuple(integrations), find, told
+        self._lock = threading.RLock()
+        self._settings: Settings | None = None
+        self._heuristic = ""
+        self._keys: dict[str, str] = {}
+        self._done = 0
+        self._outcomes: dict[tuple[str, str], Outcome | None] = {}
+        self._matches: OrderedDict[tuple[str, str], Match] = OrderedDict()
+        self._backlog: Backlog[Task] = Backlog(
+            self._work, workers=workers, name="matching", prepare=prepare, changed=changed
+        )
+        self.cancel, self.resume = self._backlog.cancel, self._backlog.resume
+        self.settle, self.close = self._backlog.settle, self._backlog.close
+
+    @property
+    def progress(self) -> Progress:
+        """How far matching by the heuristic in use is."""
+        done, total, running, cancelled = (
+            self._done,
+            len(self._integrations),
+            self._backlog.running,
+            self._backlog.cancelled,
+        )
+        return Progress(done, total, running, cancelled, _message(done, total, running, cancelled))
+
+    def use(self, settings: Settings, heuristic: str) -> None:
+        """Find all matches by a heuristic under these settings; what was found under others is no longer shown."""
+        keys = {name: settings.key(name) for name in HEURISTICS}
+        with self._lock:
+            self._settings = settings
+            if (keys, heuristic) == (self._keys, self._heuristic):
+                return
+            self._forget(name for name in HEURISTICS if keys[name] != self._keys.get(name))
+            self._keys, self._heuristic = keys, heuristic
+            self._recall(heuristic)
+            missing = [id for id in self._integrations if self._outcomes[id, heuristic] is None]
+            self._done = len(self._integrations) - len(missing)
+            self._backlog.replace([self._task(id, heuristic) for id in missing])
+
+    def _forget(self, heuristics: Iterable[str]) -> None:
+        gone = set(heuristics)
+        self._outcomes = {place: outcome for place, outcome in self._outcomes.items() if place[1] not in gone}
+        for place in [place for place in self._matches if place[1] in gone]:
+            del self._matches[place]
+
+    def ask(self, integration: str, heuristic: str) -> bool:
+        """Look for this match next; False when it is there already. One that failed is tried again."""
+        with self._lock:
+            if self.match(integration, heuristic) is not None:
+                return False
+            self._backlog.ask(self._task(integration, heuristic))
+            return True
+
+    def outcome(self, integration: str, heuristic: str) -> Outcome | None:
+        """What is known of a match; None: not computed yet."""
+        place = (integration, heuristic)
+        with self._lock:
+            if place not in self._outcomes:
+                self._outcomes[place] = _outcome(self._store.get_result(self._outcome_key(self._task(*place))))
+            return self._outcomes[place]
+
+    def match(self, integration: str, heuristic: str) -> Match | None:
+        """A match in full; None: not computed yet, or failed."""
+        place = (integration, heuristic)
+        with self._lock:
+            if place not in self._matches:
+                match = _match(self._store.get_result(self._match_key(self._task(*place))))
+                if match is None:
+                    return None
+                self._keep(place, match)
+            self._matches.move_to_end(place)
+            return self._matches[place]
+
+    def _recall(self, heuristic: str) -> None:
+        """Read what the project file holds of a heuristic, in one go."""
+        places = {self._outcome_key(self._task(id, heuristic)): (id, heuristic) for id in self._integrations}
+        held = self._store.results(list(places))
+        self._outcomes = dict.fromkeys(places.values()) | self._outcomes
+        self._outcomes |= {places[key]: _outcome(text) for key, text in held.items()}
+
+    def _work(self, task: Task, check: Check) -> None:
+        with self._lock:
+            settings = self._settings
+            if settings is None or not self._wanted(task):
+                return
+        try:
+            match = self._find(task.integration, task.heuristic, settings, check)
+        except CancelledError:
+            raise
+        except SegmapError as error:
+            self._failed(task, str(error))
+        except Exception as error:
+            log.exception("Matching %s failed.", task.integration)
+            self._failed(task, f"Matching failed: {type(error).__name__}. The server's output says where.")
+        else:
+            self._found(task, match)
+
+    def _found(self, task: Task, match: Match) -> None:
+        outcome = Outcome.of(match)
+        if self._wanted(task):
+            self._store_result(task, match, outcome)
+        self._record(task, outcome, match)
+
+    def _failed(self, task: Task, reason: str) -> None:
+        self._record(task, Outcome(task.heuristic, failure=reason))
+
+    def _record(self, task: Task, outcome: Outcome, match: Match | None = None) -> None:
+        place = (task.integration, task.heuristic)
+        with self._lock:
+            if not self._wanted(task):
+                return
+            self._done += task.heuristic == self._heuristic and self._outcomes.get(place) is None
+            self._outcomes[place] = outcome
+            if match is not None:
+                self._keep(place, match)
+        self._told(*place)
+
+    def _store_result(self, task: Task, match: Match, outcome: Outcome) -> None:
+        """Write a result to the cache; a cache that cannot be written costs time later, nothing else."""
+        try:
+            short = _OUTCOME.dump_json(outcome).decode()
+            self._store.put_results({self._match_key(task): match.to_json(), self._outcome_key(task): short})
+        except SegmapError as error:
+            log.warning("The match of %s was not kept: %s", task.integration, error)
+
+    def _wanted(self, task: Task) -> bool:
+        """False for results that come after the parameters were changed."""
+        with self._lock:
+            return task == self._task(task.integration, task.heuristic)
+
+    def _keep(self, place: tuple[str, str], match: Match) -> None:
+        self._matches[place] = match
+        while len(self._matches) > MATCHES_IN_MEMORY:
+            self._matches.popitem(last=False)
+
+    def _task(self, integration: str, heuristic: str) -> Task:
+        return Task(integration, heuristic, self._keys[heuristic])
+
+    @staticmethod
+    def _match_key(task: Task) -> str:
+        return f"match/{task.key}/{task.integration}"
+
+    @staticmethod
+    def _outcome_key(task: Task) -> str:
+        return f"outcome/{task.key}/{task.integration}"
+
+
+def _outcome(text: str | None) -> Outcome | None:
+    """The outcome a cache held; one that cannot be read is computed again."""
+    try:
+        return None if text is None else _OUTCOME.validate_json(text)
+    except ValueError:
+        return None
+
+
+def _match(text: str | None) -> Match | None:
+    try:
+        return None if text is None else Match.from_json(text)
+    except ValueError:
+        return None
+
+
+def _message(done: int, total: int, running: int, cancelled: bool) -> str:
+    if done >= total:
+        return f"All {total} pairs are matched." if total else "There is nothing to match."
+    if cancelled:
+        return f"Stopped: {done} of {total} pairs are matched."
+    return f"{done} of {total} pairs are matched." if running or done else f"{total} pairs are about to be matched."

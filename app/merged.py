@@ -1,0 +1,101 @@
+"""The merged map of what is accepted, computed again in the background after each decision."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from app.jobs import Check, Latest
+from segmap.errors import CancelledError, ProjectError, SegmapError
+from segmap.merging import Component, map_hash, merge_accepted
+from segmap.parameters import Parameters
+from segmap.project import ProjectState, accepted
+from segmap.scans import ScanId
+from segmap.segments import SegmentMap
+
+__all__ = ["Merged", "MergedMap", "map_parameters", "merge_project"]
+
+Extractor = Callable[[ScanId, Parameters], SegmentMap]
+
+
+@dataclass(frozen=True)
+class Merged:
+    """The merged map of what was accepted at a revision, under some parameters."""
+
+    revision: int = 0
+    components: tuple[Component, ...] = ()
+    hash: str = ""
+    parameters: Parameters | None = None
+
+
+def map_parameters(parameters: Parameters) -> Parameters:
+    """The same for parameters that make the same map: the threshold only proposes, decisions hold."""
+    return parameters.replace(value_threshold=0.0)
+
+
+def merge_project(
+    state: ProjectState, extractor: Extractor, previous: Merged | None = None, check: Check | None = None
+) -> Merged:
+    """The map of everything accepted in a project, and of nothing else; scans nobody accepted are not in it.
+
+    What did not change since ``previous`` is taken from there, with the same result.
+    """
+    edges, parameters = accepted(state), map_parameters(state.parameters)
+    scans = sorted({scan for first, second, _ in edges for scan in (first, second)})
+    maps = {}
+    for scan in scans:
+        if check is not None:
+            check()
+        maps[scan] = extractor(scan, state.parameters)
+    reusable = previous.components if previous and previous.parameters == parameters else ()
+    components = merge_accepted(maps, edges, state.parameters, previous=reusable, check=check)
+    return Merged(state.revision, components, map_hash(components), parameters)
+
+
+class MergedMap:
+    """Keeps the merged map of a project up to date, in a thread of its own."""
+
+    def __init__(
+        self,
+        state: Callable[[], ProjectState],
+        extractor: Extractor,
+        done: Callable[[Merged], None],
+        failed: Callable[[str], None],
+        prepare: Callable[[Check], None],
+    ) -> None:
+        self._state, self._extractor, self._prepare = state, extractor, prepare
+        self._done, self._failed = done, failed
+        self._trouble = ""
+        self.current = Merged()
+        self._latest = Latest(self._merge, "merging")
+        self.ask, self.settle, self.close = self._latest.ask, self._latest.settle, self._latest.close
+
+    @property
+    def busy(self) -> bool:
+        """Whether the map is being computed, or is about to be."""
+        return self._latest.busy
+
+    def wait(self, timeout: float | None = None) -> Merged:
+        """The map of what is accepted now.
+
+        Raises:
+            ProjectError: it could not be computed, or not within ``timeout`` seconds.
+        """
+        if not self.settle(timeout):
+            raise ProjectError("The merged map is still being computed: try again in a moment.")
+        if self._trouble:
+            raise ProjectError(self._trouble)
+        return self.current
+
+    def _merge(self, check: Check) -> None:
+        self._prepare(check)
+        try:
+            self.current = merge_project(self._state(), self._extractor, self.current, check)
+        except CancelledError:
+            raise
+        except SegmapError as error:
+            self._trouble = f"The merged map could not be computed: {error}"
+            self._failed(self._trouble)
+        else:
+            self._trouble = ""
+            self._done(self.current)

@@ -1,0 +1,128 @@
+"""The review queue: what was found, what is decided, and the parameters it depends on."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+
+from app.routes.common import Opened
+from app.schemas import (
+    DecisionMade,
+    Decisions,
+    Detail,
+    HeuristicResult,
+    Integration,
+    MatchingAction,
+    ParametersChange,
+    ProgressBody,
+    Queue,
+    Threshold,
+    Turn,
+    Turned,
+)
+from app.session import Change, Session
+from segmap.candidates import HEURISTICS
+
+__all__ = ["router"]
+
+router = APIRouter(prefix="/api/projects/{project}", tags=["review"])
+
+
+@router.get("/integrations")
+def integrations(session: Opened) -> Queue:
+    """All integrations, the one that most needs a person first."""
+    return Queue(integrations=[Integration.of(row) for row in session.rows()])
+
+
+@router.get("/integrations/{integration}")
+def integration(
+    session: Opened, integration: str, heuristic: Annotated[str | None, Query(max_length=255)] = None
+) -> Detail:
+    """One integration in full; a match that is not known yet is looked for next."""
+    row = session.row(integration)
+    match = session.match(integration, heuristic)
+    if match is None:
+        session.request(integration, heuristic)
+    return Detail(
+        row=Integration.of(row),
+        match=None if match is None else json.loads(match.to_json()),
+        heuristics=_heuristics(session, integration),
+    )
+
+
+def _heuristics(session: Session, integration: str) -> list[HeuristicResult]:
+    known = [session.outcome(integration, name) for name in HEURISTICS]
+    fields = HeuristicResult.model_fields
+    return [
+        HeuristicResult(**{name: getattr(outcome, name) for name in fields})
+        for outcome in known
+        if outcome is not None and not outcome.failure
+    ]
+
+
+@router.post("/decisions")
+def decide(session: Opened, body: Decisions) -> DecisionMade:
+    """Accept, reject, or make undecided again."""
+    if body.verdict == "undecided":
+        change = session.clear(
+            body.integrations, who=body.who, reason=body.reason, expected_revision=body.expected_revision
+        )
+    else:
+        change = session.decide(
+            body.integrations,
+            body.verdict,
+            candidate=body.candidate,
+            heuristic=body.heuristic,
+            reason=body.reason,
+            who=body.who,
+            expected_revision=body.expected_revision,
+        )
+    return DecisionMade(**_made(session, change))
+
+
+@router.post("/undo")
+def undo(session: Opened, body: Turn) -> Turned:
+    """Take the last step back."""
+    what = session.state.can_undo
+    change = session.undo(body.who, expected_revision=body.expected_revision)
+    return Turned(**_made(session, change), undone=what)
+
+
+@router.post("/redo")
+def redo(session: Opened, body: Turn) -> Turned:
+    """Bring the step undone last back into force."""
+    what = session.state.can_redo
+    change = session.redo(body.who, expected_revision=body.expected_revision)
+    return Turned(**_made(session, change), redone=what)
+
+
+def _made(session: Session, change: Change) -> dict[str, Any]:
+    state = change.state
+    rows = [Integration.of(session.row(name)) for name in change.integrations[:200]]
+    return {"revision": state.revision, "undo": state.can_undo, "redo": state.can_redo, "rows": rows}
+
+
+@router.post("/parameters")
+def parameters(session: Opened, body: ParametersChange) -> DecisionMade:
+    """Change parameters, the heuristic, or both; what was found under others is looked for again."""
+    change = session.configure(body.changes, preset_name=body.preset, heuristic=body.heuristic, who=body.who)
+    return DecisionMade(**_made(session, change))
+
+
+@router.get("/threshold")
+def threshold(session: Opened, value: Annotated[float, Query(ge=0.0, le=100_000.0)]) -> Threshold:
+    """Which undecided integrations another threshold would flip."""
+    flips = session.preview_threshold(value)
+    return Threshold(would_pass=list(flips.would_pass), would_fail=list(flips.would_fail))
+
+
+@router.post("/matching")
+def matching(session: Opened, body: MatchingAction) -> ProgressBody:
+    """Stop matching in the background, or go on with it."""
+    if body.action == "cancel":
+        session.cancel()
+    else:
+        session.resume()
+    return ProgressBody(**session.progress.to_json())

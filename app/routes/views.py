@@ -1,0 +1,43 @@
+"""Views: what a page looks at, and what it asks its view to do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter
+
+from app.actions import perform
+from app.routes.common import Opened, Site
+from app.schemas import Action, ViewOpened
+
+__all__ = ["router"]
+
+router = APIRouter(prefix="/api", tags=["views"])
+
+
+@router.post("/projects/{project}/views", status_code=201)
+def open_view(site: Site, session: Opened) -> ViewOpened:
+    """A new view of a project, with a scene of its own."""
+    opened = site.views.open(session)
+    return ViewOpened(id=opened.id, scene=f"/views/{opened.id}/scene/")
+
+
+@router.get("/views/{view}")
+def snapshot(site: Site, view: str) -> dict[str, Any]:
+    """What a view shows."""
+    return site.views.get(view).view.snapshot()
+
+
+@router.post("/views/{view}")
+def act(site: Site, view: str, body: Action) -> dict[str, Any]:
+    """Let a view do something; the answer is what it shows then."""
+    found = site.views.get(view).view
+    perform(found, body.action, body.value)
+    return found.snapshot()
+
+
+@router.delete("/views/{view}")
+def close_view(site: Site, view: str) -> dict[str, Any]:
+    """Close a view and its scene."""
+    site.views.close(view)
+    return {}

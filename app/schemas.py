@@ -1,0 +1,311 @@
+"""Bodies of requests and responses."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.review import Row
+
+__all__ = [
+    "Action",
+    "Component",
+    "Counts",
+    "Created",
+    "DecisionMade",
+    "Decisions",
+    "Detail",
+    "Failure",
+    "HeuristicResult",
+    "Integration",
+    "LogFacts",
+    "MatchingAction",
+    "ParameterList",
+    "ParametersChange",
+    "ProgressBody",
+    "Project",
+    "ProjectList",
+    "ProjectSummary",
+    "Queue",
+    "Sample",
+    "SampleChoice",
+    "SampleList",
+    "Threshold",
+    "Turn",
+    "Turned",
+    "ViewOpened",
+]
+
+Text = Annotated[str, Field(max_length=10_000)]
+Name = Annotated[str, Field(max_length=255)]
+IntegrationId = Annotated[str, Field(max_length=64)]
+Revision = Annotated[int, Field(ge=0, le=2**53)]
+Rank = Annotated[int, Field(ge=0, le=2**31)]
+Scalar = bool | int | float | Name | None
+
+
+class _Body(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+# --- requests -------------------------------------------------------------------------------------
+
+
+class SampleChoice(_Body):
+    """Make a project of a sample."""
+
+    sample: Name
+
+
+class Decisions(_Body):
+    """Decide integrations, all in one step that can be undone."""
+
+    integrations: Annotated[list[IntegrationId], Field(min_length=1, max_length=100_000)]
+    verdict: Literal["accepted", "rejected", "undecided"]
+    candidate: Rank | None = None
+    """rank of the candidate, 0 for the best; default: the best"""
+    heuristic: Name | None = None
+    """whose match; default: the project's heuristic"""
+    reason: Text = ""
+    who: Name = ""
+    expected_revision: Revision | None = None
+    """the revision the page shows: refused with 409 where somebody decided the same since"""
+
+
+class Turn(_Body):
+    """Undo or redo."""
+
+    who: Name = ""
+    expected_revision: Revision | None = None
+
+
+class ParametersChange(_Body):
+    """Change parameters, from those in force or from a preset; change the heuristic."""
+
+    changes: Annotated[dict[Name, Scalar], Field(default_factory=dict, max_length=200)]
+    preset: Name | None = None
+    heuristic: Name | None = None
+    who: Name = ""
+
+
+class MatchingAction(_Body):
+    """Stop matching in the background, or go on with it."""
+
+    action: Literal["cancel", "resume"]
+
+
+class Action(_Body):
+    """Something a view is asked to do."""
+
+    action: Name
+    value: bool | int | float | Text | dict[Name, Any] | list[Any] | None = None
+
+
+# --- responses ------------------------------------------------------------------------------------
+
+
+class Failure(BaseModel):
+    """What every failure answers with."""
+
+    class Error(BaseModel):
+        message: str
+        kind: str
+
+    error: Error
+
+
+class LogFacts(BaseModel):
+    """A log of a project."""
+
+    name: str
+    format: str
+    scans: int
+    no_return: float | None = None
+    """metres; the reading that stands for "nothing seen" in this log"""
+    problems: list[str] = []
+    """lines that were left out, and why"""
+
+
+class Counts(BaseModel):
+    """How many integrations there are, and how many in each state."""
+
+    total: int
+    accepted: int
+    rejected: int
+    pending: int
+    matching: int = 0
+    none: int = 0
+    failed: int = 0
+
+
+class ProjectSummary(BaseModel):
+    """A project in the list of projects."""
+
+    id: str
+    name: str
+    logs: list[LogFacts]
+    scans: int
+    integrations: Counts
+    modified: str
+    url: str
+    problem: str = ""
+    """why the project cannot be opened; empty where it can"""
+
+
+class ProjectList(BaseModel):
+    """All projects, the one changed last first."""
+
+    projects: list[ProjectSummary]
+
+
+class Created(BaseModel):
+    """A new project."""
+
+    id: str
+    name: str
+    url: str
+    problems: list[str]
+    """what was left out of its logs, and why"""
+
+
+class Sample(BaseModel):
+    """A sample log."""
+
+    name: str
+    title: str
+    description: str
+    scans: int
+    picture: str
+
+
+class SampleList(BaseModel):
+    """All samples."""
+
+    samples: list[Sample]
+
+
+class ParameterList(BaseModel):
+    """Every parameter, for forms; and the presets."""
+
+    parameters: list[dict[str, Any]]
+    presets: dict[str, dict[str, Any]]
+
+
+class ProgressBody(BaseModel):
+    """How far matching is."""
+
+    done: int
+    total: int
+    running: int
+    cancelled: bool
+    message: str
+
+
+class Component(BaseModel):
+    """A connected part of the merged map."""
+
+    name: str
+    scans: list[str]
+    segments: int
+    length: float
+    """metres, of all segments"""
+
+
+class Project(BaseModel):
+    """A project, open."""
+
+    id: str
+    name: str
+    logs: list[LogFacts]
+    parameters: dict[str, Any]
+    threshold: float
+    heuristic: str
+    heuristics: list[str]
+    mode: str
+    revision: int
+    progress: ProgressBody
+    undo: str | None
+    redo: str | None
+    counts: Counts
+    components: list[Component]
+    unplaced: list[str]
+    """scans without an accepted integration"""
+    merging: bool
+    """whether the merged map is being computed"""
+
+
+class Integration(BaseModel):
+    """A row of the review queue."""
+
+    id: str
+    first: str
+    second: str
+    state: Literal["matching", "pending", "accepted", "rejected", "none", "failed"]
+    value: float | None
+    above: bool | None
+    heuristic: str
+    candidates: int | None
+    milliseconds: float | None
+    who: str
+    reason: str
+
+    @classmethod
+    def of(cls, row: Row) -> Integration:
+        """A row as a body."""
+        return cls(**row.to_json())
+
+
+class Queue(BaseModel):
+    """The review queue, the integration that most needs a person first."""
+
+    integrations: list[Integration]
+
+
+class HeuristicResult(BaseModel):
+    """What a heuristic found on one pair."""
+
+    heuristic: str
+    candidates: int
+    draws: int | None
+    milliseconds: float
+    value: float
+    pose: tuple[float, float, float] | None
+
+
+class Detail(BaseModel):
+    """One integration in full."""
+
+    row: Integration
+    match: dict[str, Any] | None
+    heuristics: list[HeuristicResult]
+
+
+class DecisionMade(BaseModel):
+    """What a decision changed."""
+
+    revision: int
+    undo: str | None
+    redo: str | None
+    rows: list[Integration]
+
+
+class Turned(DecisionMade):
+    """What undo or redo did."""
+
+    undone: str | None = None
+    redone: str | None = None
+
+
+class Threshold(BaseModel):
+    """What another threshold would change."""
+
+    would_pass: list[str]
+    would_fail: list[str]
+
+
+class ViewOpened(BaseModel):
+    """A new view, and where its scene is."""
+
+    id: str
+    scene: str

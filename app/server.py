@@ -1,0 +1,194 @@
+"""The server: everything wired together, and started."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import sys
+import threading
+import webbrowser
+from collections.abc import AsyncIterator, Iterable
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+
+import uvicorn
+from fastapi import FastAPI
+from rich.console import Console
+from rich.text import Text
+from starlette.concurrency import run_in_threadpool
+from starlette.staticfiles import StaticFiles
+
+from app.errors import RequestError
+from app.failures import answer_failures
+from app.jobs import WarmUp
+from app.resources import program_version, static_folder
+from app.routes import pages, projects, review, stream, views
+from app.schemas import Failure
+from app.security import UPLOAD_BYTES, WILDCARDS, Guard
+from app.services import Services
+from app.views import Views
+from app.workspace import Workspace
+
+__all__ = ["create_app", "serve"]
+
+HOST = "127.0.0.1"
+PORT = 8000
+NEXT_PORTS = 20
+REAP_SECONDS = 10.0
+GRACE_SECONDS = 3
+SOCKET_BYTES = 64 * 1024 * 1024
+ROUTERS = (pages.router, projects.router, review.router, stream.router, views.router)
+
+
+def create_app(
+    workspace: Workspace | Path | None = None,
+    *,
+    open_views: Views | None = None,
+    warm_up: WarmUp | None = None,
+    bound: str = HOST,
+    upload_bytes: int = UPLOAD_BYTES,
+) -> FastAPI:
+    """The workbench on a folder of projects.
+
+    ``bound`` is the address it is reached at; ``warm_up`` compiles the kernels ahead, None: when needed.
+    """
+    if not isinstance(workspace, Workspace):
+        workspace = Workspace(workspace, warm_up=warm_up)
+    services = Services(workspace, open_views or Views(), warm_up=warm_up)
+    app = FastAPI(
+        title="segmap",
+        version=program_version(),
+        lifespan=_lifespan,
+        docs_url=None,  # its page would be loaded from elsewhere
+        redoc_url=None,
+        openapi_url="/api/openapi.json",
+        responses={"4XX": {"model": Failure}},
+    )
+    app.state.services = services
+    for router in ROUTERS:
+        app.include_router(router)
+    app.mount("/static", StaticFiles(directory=static_folder()), name="static")
+    answer_failures(app)
+    app.add_middleware(Guard, bound=bound, upload_bytes=upload_bytes)
+    return app
+
+
+@asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    services: Services = app.state.services
+    services.start()
+    reaper = asyncio.create_task(_reap(services.views))
+    try:
+        yield
+    finally:
+        reaper.cancel()
+        services.streams.close()
+        await run_in_threadpool(services.close)
+
+
+async def _reap(open_views: Views) -> None:
+    while True:
+        await asyncio.sleep(REAP_SECONDS)
+        await run_in_threadpool(open_views.reap)
+
+
+# --- serving --------------------------------------------------------------------------------------
+
+
+def serve(
+    files: Iterable[Path] = (),
+    host: str = HOST,
+    port: int | None = None,
+    workspace: Path | None = None,
+    open_browser: bool = False,
+) -> None:
+    """Serve the workbench until it is interrupted, with a project of ``files`` where some are given.
+
+    ``port`` None: 8000, or the next one that is free. ``workspace``: the folder of projects.
+
+    Raises:
+        SegmapError: a file cannot be read, or the address cannot be used; nothing was started.
+    """
+    warm_up = WarmUp()
+    projects_of = Workspace(workspace, warm_up=warm_up)
+    paths = list(files)
+    path = f"/projects/{projects_of.open_files(paths)}" if paths else "/"
+    listening = _listen(host, port)
+    app = create_app(projects_of, warm_up=warm_up, bound=host)
+    _Server(app, listening, f"http://{_authority(host, listening)}{path}", open_browser).run_until_stopped()
+
+
+class _Server(uvicorn.Server):
+    """uvicorn that says where it is once it is there, and ends event streams before it waits for pages to go."""
+
+    def __init__(self, app: FastAPI, listening: socket.socket, url: str, open_browser: bool) -> None:
+        super().__init__(_config(app))
+        self._app, self._listening, self._url, self._open_browser = app, listening, url, open_browser
+
+    def run_until_stopped(self) -> None:
+        """Serve; Ctrl+C ends it."""
+        with suppress(KeyboardInterrupt):
+            self.run(sockets=[self._listening])
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        console = Console(stderr=True, soft_wrap=True)
+        console.print(Text.assemble("segmap is at ", (self._url, "bold"), "  (Ctrl+C ends it)"))
+        if self._open_browser:
+            threading.Thread(target=webbrowser.open, args=(self._url,), daemon=True).start()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        self._app.state.services.streams.close()
+        await super().shutdown(sockets)
+
+
+def _config(app: FastAPI) -> uvicorn.Config:
+    return uvicorn.Config(
+        app,
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        ws_max_size=SOCKET_BYTES,
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=GRACE_SECONDS,
+    )
+
+
+def _listen(host: str, port: int | None) -> socket.socket:
+    """A socket that listens at the port, or, where none was asked for, at the first free one.
+
+    Raises:
+        RequestError: there is no such address, or the port is taken.
+    """
+    for wanted in (port,) if port is not None else (*range(PORT, PORT + NEXT_PORTS), 0):
+        try:
+            listening = _bind(host, wanted)
+        except OSError as error:
+            failure = error
+        else:
+            if port is None and wanted != PORT:
+                print(f"segmap: port {PORT} is taken, so another one is used.", file=sys.stderr)
+            return listening
+    reason = (failure.strerror or str(failure)).lower()
+    raise RequestError(
+        f"{host}, port {port if port is not None else PORT}, cannot be used: {reason}. Try another --port."
+    )
+
+
+def _bind(host: str, port: int) -> socket.socket:
+    family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    listening = socket.socket(family, kind, protocol)
+    try:
+        if sys.platform != "win32":  # there it would let two servers share a port
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+    except BaseException:
+        listening.close()
+        raise
+    return listening
+
+
+def _authority(host: str, listening: socket.socket) -> str:
+    """Host and port as they stand in an address; a server on all addresses is reached at this machine's own."""
+    name = "127.0.0.1" if host in WILDCARDS else host
+    return f"[{name}]:{listening.getsockname()[1]}" if ":" in name else f"{name}:{listening.getsockname()[1]}"

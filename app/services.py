@@ -1,0 +1,34 @@
+"""What the routes work with: one of each for a server."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from app.jobs import WarmUp
+from app.streams import Streams
+from app.views import Views
+from app.workspace import Workspace
+
+__all__ = ["Services"]
+
+
+@dataclass(frozen=True)
+class Services:
+    """The projects, the open views, the event streams, and the kernels' compilation."""
+
+    workspace: Workspace
+    views: Views = field(default_factory=Views)
+    streams: Streams = field(default_factory=Streams)
+    warm_up: WarmUp | None = None
+
+    def start(self) -> None:
+        """Begin what must not wait for the first page."""
+        if self.warm_up is not None:
+            self.warm_up.start()
+
+    def close(self) -> None:
+        """Close scenes, sessions and processes."""
+        if self.warm_up is not None:
+            self.warm_up.close()
+        self.views.close_all()
+        self.workspace.close()
