@@ -9,11 +9,16 @@ const TALLY = ["accepted", "rejected", "pending"];
 /** A card that stands where something is being loaded. */
 export const placeholder = () => h("li.card.placeholder", { "aria-hidden": "true" });
 
-/** A project: its map, its name, what it holds and when it last changed. */
+/** A project: its map, its name, what it holds and when it last changed; one that cannot be opened says why. */
 export function projectCard(project) {
-  const link = h("a", { href: project.url }, project.name);
-  const body = h("div.body", {}, h("h3", {}, link), h("p.muted", {}, holds(project)), h("p.muted", {}, ago(project.modified)), tally(project.integrations));
-  return h("li.card", {}, picture(`/api/projects/${encodeURIComponent(project.id)}/map.svg`, "No map yet"), body);
+  const map = project.integrations.accepted ? `/api/projects/${encodeURIComponent(project.id)}/map.svg` : null;
+  const title = h("h3", {}, project.problem ? project.name : h("a", { href: project.url }, project.name));
+  return h("li.card", {}, picture(map, "No map yet"), h("div.body", {}, title, project.problem ? h("p.trouble", {}, project.problem) : facts(project)));
+}
+
+function facts(project) {
+  const modified = h("p.muted", {}, ago(project.modified));
+  return [h("p.muted", {}, holds(project)), modified, tally(project.integrations)];
 }
 
 /** A sample log and the button that opens it as a new project. */
@@ -44,10 +49,11 @@ function holds({ logs, scans, integrations }) {
 
 /** A map picture; a sentence stands in its place where there is none. */
 function picture(url, otherwise) {
+  const sentence = h("p", {}, otherwise);
+  if (!url) return h("div.picture", {}, sentence);
   const image = h("img", { src: url, alt: "", loading: "lazy" });
-  const frame = h("div.picture", {}, image);
-  image.addEventListener("error", () => frame.replaceChildren(h("p", {}, otherwise)));
-  return frame;
+  image.addEventListener("error", () => image.replaceWith(sentence));
+  return h("div.picture", {}, image);
 }
 
 /** How far the decisions are, as a bar. */

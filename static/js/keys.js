@@ -25,7 +25,9 @@ export const KEYS = [
   ["Scene", [
     ["T", "next stage", "next_stage"],
     ["Shift+T", "previous stage", "previous_stage"],
+    ["1–6", "a stage by its number", "stage"],
     ["V", "2D or 3D", "toggle_dimension"],
+    ["F", "fit everything into the window", "fit"],
     ["?", "this sheet", "help"],
   ]],
 ];
@@ -35,10 +37,10 @@ export function listen(actions) {
   const names = new Map(KEYS.flatMap(([, keys]) => keys.map(([key, , name]) => [key, name])));
   document.addEventListener("keydown", (event) => {
     if (typing(event)) return;
-    const action = actions[names.get(pressed(event))];
-    if (!action || (event.repeat && DELIBERATE.has(names.get(pressed(event))))) return;
+    const name = names.get(pressed(event));
+    if (!actions[name] || (event.repeat && DELIBERATE.has(name))) return;
     event.preventDefault();
-    action();
+    actions[name](event.key);
   });
 }
 
@@ -59,6 +61,7 @@ function line([key, what]) {
 }
 
 function pressed(event) {
+  if (/^[1-6]$/.test(event.key)) return "1–6";
   const letter = event.key.length === 1 ? event.key.toUpperCase() : event.key;
   return event.shiftKey && /^[A-Z]$/.test(letter) ? `Shift+${letter}` : letter;
 }

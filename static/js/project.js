@@ -49,13 +49,22 @@ async function connect() {
   addEventListener("pagehide", () => view.close());
   addEventListener("pageshow", (event) => event.persisted && view.open().catch(failed));
   document.addEventListener("visibilitychange", () => document.hidden || view.check().catch(failed));
-  await view.open(decodeURIComponent(location.hash.slice(1)));
-  if (!view.integration && project.rows.length) await view.select(project.rows[0].id);
-  if (project.rows.length === 0) cover("There is nothing to show: this project has no pair of scans.");
+  await look(stream, decodeURIComponent(location.hash.slice(1)));
+}
+
+/** Open the view; where that fails, the queue is there nevertheless. */
+async function look(stream, integration) {
+  try {
+    await view.open(integration);
+    if (project.rows.length === 0) cover("There is nothing to show: this project has no pair of scans.");
+  } catch (error) {
+    listenTo(stream);
+    cover(`The scene cannot be opened. ${error.message}`, () => look(stream, integration));
+  }
 }
 
 function listenTo(stream) {
-  stream.open(`${project.url}/events?view=${encodeURIComponent(view.id)}`);
+  stream.open(`${project.url}/events${view.id ? `?view=${encodeURIComponent(view.id)}` : ""}`);
 }
 
 /** The server does not know the view any more, as after a restart: open another, or listen again where it does. */
@@ -96,7 +105,8 @@ function keyboard() {
   const actions = { next: () => queue.turn(1), previous: () => queue.turn(-1), search, help };
   for (const name of ["undo", "redo"]) actions[name] = () => byId(name).disabled || byId(name).click();
   for (const name of ["accept", "reject"]) actions[name] = () => view.act(name, view.integration).catch(failed);
-  for (const name of ["skip", "toggle_dimension"]) actions[name] = act(name);
+  for (const name of ["skip", "toggle_dimension", "fit"]) actions[name] = act(name);
+  actions.stage = (number) => view.act("set_stage", view.snapshot.stages[number - 1]).catch(failed);
   for (const what of ["candidate", "heuristic", "stage"]) {
     for (const way of ["next", "previous"]) actions[`${way}_${what}`] = act(`${way}_${what}`);
   }

@@ -21,16 +21,19 @@ function theme(view) {
   view.act("set_theme", DARK.matches ? "dark" : "light").catch((error) => view.project.tell("trouble", error));
 }
 
-/** Cover the scene with a sentence, or uncover it. */
-export function cover(sentence) {
+/** Cover the scene with a sentence, or uncover it; `again` is offered as a button. */
+export function cover(sentence, again = null) {
   byId("scene-cover").hidden = !sentence;
+  byId("scene-again").hidden = !again;
+  byId("scene-again").onclick = again;
   text(byId("scene-cover-text"), sentence);
 }
 
 function loaded(frame, keys) {
   const inside = frame.contentDocument;
   if (!inside || inside.URL === "about:blank") return;
-  cover(inside.querySelector("#root, canvas, svg") ? "" : "The scene could not be loaded. Reload the page to try again.");
+  const there = inside.querySelector("#root, canvas");
+  cover(there ? "" : "The scene could not be loaded.", there ? null : () => frame.contentWindow.location.reload());
   inside.addEventListener("keydown", (event) => {
     if (event.target.closest?.("input, textarea") || event.ctrlKey || event.metaKey) return;
     keys[event.key]?.();

@@ -5,6 +5,7 @@ import { count, metres, whole } from "./format.js";
 import { sentence } from "./problems.js";
 
 const LINES = 50;
+const EMPTY = "The map is empty: accept an integration, and its scans are merged.";
 
 /** Keep both lists up to date. */
 export function summary(project) {
@@ -14,10 +15,9 @@ export function summary(project) {
   });
 }
 
-function components({ components: all }) {
-  const joined = all.filter((component) => component.scans.length > 1);
-  const alone = all.filter((component) => component.scans.length === 1).flatMap((component) => component.scans);
-  fill(byId("components"), joined.map(component), aloneItem(alone), all.length === 0 && h("li.muted", {}, "The map is empty: there are no scans."));
+function components({ components: all, unplaced, merging }) {
+  const state = merging ? h("li.muted", {}, "The map is being computed…") : all.length === 0 && h("li.muted", {}, EMPTY);
+  fill(byId("components"), state, all.map(component), aloneItem(unplaced));
 }
 
 function component({ name, scans, segments, length }) {
