@@ -47,7 +47,7 @@ class Laser:
     """radians, heading of beam 0"""
     angle_step: float = np.pi / 180
     """radians"""
-    deviation: float = 0.01
+    deviation: float = 0.008
     """metres, of a range"""
     resolution: float = 0.01
     """metres"""
@@ -67,15 +67,21 @@ class Laser:
 
     def ranges(self, world: World, T_world_sensor: Pose2, noise: Noise) -> FloatArray:
         """What it reports from a place, shape (beams,), metres, ``no_return`` included."""
-        sides = [cast(world.segments, T_world_sensor, self.angles + s * self.footprint / 2) for s in (-1.0, 1.0)]
-        near, far = np.minimum(sides[0][0], sides[1][0]), np.maximum(sides[0][0], sides[1][0])
-        share, jitter, luck = noise.uniform(self.beams), noise.normal(self.beams), noise.uniform(self.beams)
-        seen = (near < self.reach) & (luck >= self.dropouts)
-        near = np.minimum(near, self.reach)
-        far = np.where(far < self.reach, far, near)
-        reported = near + _mixing(share) * (far - near) + self.deviation * jitter
-        steps = np.maximum(np.rint(reported / self.resolution), 1.0)
+        true = self._met(world, T_world_sensor, noise.uniform(self.beams))
+        jitter, luck = noise.normal(self.beams), noise.uniform(self.beams)
+        seen = (true < self.reach) & (luck >= self.dropouts)
+        steps = np.maximum(np.rint((np.where(seen, true, 0.0) + self.deviation * jitter) / self.resolution), 1.0)
         return np.where(seen, steps * self.resolution, self.no_return)
+
+    def _met(self, world: World, T_world_sensor: Pose2, share: FloatArray) -> FloatArray:
+        """The distance each beam reports: where its two sides meet different things, something between the two."""
+        sides = [cast(world.segments, T_world_sensor, self.angles + s * self.footprint / 2) for s in (-1.0, 1.0)]
+        (right, on_right), (left, on_left) = sides
+        centre, _ = cast(world.segments, T_world_sensor, self.angles)
+        near, far = np.minimum(right, left), np.minimum(np.maximum(right, left), self.reach)
+        with np.errstate(invalid="ignore"):
+            mixed = near + _mixing(share) * (far - near)
+        return np.where((on_right == on_left) | (far >= self.reach), centre, mixed)
 
     def scan(self, world: World, T_world_sensor: Pose2, noise: Noise) -> LaserScan:
         """One sweep from a place."""

@@ -89,8 +89,8 @@ def _two_robots() -> tuple[Session, ...]:
     worlds = [plans.wing().with_shapes(plans.wing_things(session)) for session in (0, 1)]
     first, second = plans.WING_WAYS
     return (
-        _session("two-robots-a.log", worlds[0], first, seed=31),
-        _session("two-robots-b.log", worlds[1], second, seed=41, with_odometry=False),
+        _session("two-robots-a.log", worlds[0], first, seed=31, step=0.85),
+        _session("two-robots-b.log", worlds[1], second, seed=41, step=0.85, with_odometry=False),
     )
 
 
