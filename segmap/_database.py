@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import os
 import sqlite3
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from segmap.errors import ProjectError
 
-__all__ = ["MIGRATIONS", "create_database", "explained", "open_database", "reserved", "transaction"]
+__all__ = [
+    "MIGRATIONS",
+    "create_database",
+    "explained",
+    "insert_event",
+    "open_database",
+    "reserved",
+    "select_events",
+    "transaction",
+]
 
 APPLICATION_ID = int.from_bytes(b"SGMP", "big")
 MAGIC = b"SQLite format 3\0"
@@ -19,7 +29,7 @@ MAGIC = b"SQLite format 3\0"
 def _to_version_1(connection: sqlite3.Connection) -> None:
     """Events and logs that only grow, and results that may go at any time."""
     for statement in (
-        "CREATE TABLE events (seq INTEGER PRIMARY KEY, body TEXT NOT NULL)",
+        "CREATE TABLE events (seq INTEGER PRIMARY KEY, body TEXT NOT NULL, crc INTEGER NOT NULL)",
         """CREATE TABLE chunks (
             event INTEGER NOT NULL REFERENCES events (seq) DEFERRABLE INITIALLY DEFERRED,
             position INTEGER NOT NULL,
@@ -54,12 +64,15 @@ def explained(path: Path) -> Iterator[None]:
         yield
     except sqlite3.Error as error:
         raise ProjectError(_sentence(path, error)) from error
+    except UnicodeDecodeError as error:  # in the names of its tables, or in SQLite's own message about them
+        raise ProjectError(_DAMAGED.format(path=path, error="text that is no text")) from error
     except OSError as error:
         raise ProjectError(f"{path} cannot be used: {error.strerror or error}.") from error
 
 
 _BUSY = "{path} is being written by another program: wait until it has finished or close it, then try again."
 _DAMAGED = "{path} is damaged or cut off ({error}): open a backup of it, or fetch it again."
+_UNFINISHED = "{path} is empty: its making was interrupted. Delete it and make it again."
 _READ_ONLY = (
     "{path} cannot be written: it, or its folder, is read-only. Copy it to a folder you may write to and open the copy."
 )
@@ -81,7 +94,13 @@ def _sentence(path: Path, error: sqlite3.Error) -> str:
     if isinstance(error, sqlite3.ProgrammingError) and "closed" in str(error):
         return f"{path} is closed: open it again."
     code = getattr(error, "sqlite_errorcode", -1) & 0xFF  # the low byte is the kind, the rest its detail
-    return _SENTENCES.get(code, "{path} cannot be used as a project: {error}.").format(path=path, error=error)
+    return _SENTENCES.get(code, "{path} cannot be used as a project: {error}.").format(
+        path=path, error=_one_line(error)
+    )
+
+
+def _one_line(text: object) -> str:
+    return " ".join(str(text).split())[:200]
 
 
 @contextmanager
@@ -96,6 +115,29 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
             if connection.in_transaction:
                 connection.execute("ROLLBACK")
         raise
+
+
+def insert_event(connection: sqlite3.Connection, seq: int, body: str) -> None:
+    """Write an event with a checksum: SQLite finds damage to its own structure, not to what it holds."""
+    connection.execute("INSERT INTO events VALUES (?, ?, ?)", (seq, body, _crc(seq, body.encode())))
+
+
+def select_events(path: Path, connection: sqlite3.Connection, after: int) -> list[tuple[int, bytes]]:
+    """Sequence number and body of every event after one, in order.
+
+    Raises:
+        ProjectError: an event is not what was written.
+    """
+    query = "SELECT seq, CAST(body AS BLOB), crc FROM events WHERE seq > ? ORDER BY seq"
+    rows = connection.execute(query, (after,)).fetchall()
+    for seq, body, crc in rows:
+        if _crc(seq, body) != crc:
+            raise ProjectError(_DAMAGED.format(path=path, error=f"event {seq} is not what was written"))
+    return [(seq, body) for seq, body, _ in rows]
+
+
+def _crc(seq: int, body: bytes) -> int:
+    return zlib.crc32(b"%d " % seq + body)
 
 
 @contextmanager
@@ -141,7 +183,7 @@ def create_database(path: Path, body: str, patience: float) -> sqlite3.Connectio
             with transaction(connection):
                 connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
                 _migrate(connection)
-                connection.execute("INSERT INTO events VALUES (1, ?)", (body,))
+                insert_event(connection, 1, body)
             _make_safe(connection)
     return connection
 
@@ -201,13 +243,15 @@ def _check_header(path: Path) -> None:
     with explained(path), path.open("rb") as file:
         start = file.read(len(MAGIC))
     if not start:
-        raise ProjectError(f"{path} is empty: its making was interrupted. Delete it and make it again.")
+        raise ProjectError(_UNFINISHED.format(path=path))
     if start != MAGIC:
         raise ProjectError(f"{path} is not a segmap project: choose a file that segmap has written.")
 
 
 def _check(path: Path, connection: sqlite3.Connection) -> None:
     """Ours, of a version we know, whole, and with exactly the tables and triggers we make."""
+    if not _pragma(connection, "page_count"):
+        raise ProjectError(_UNFINISHED.format(path=path))
     version = _pragma(connection, "user_version")
     if _pragma(connection, "application_id") != APPLICATION_ID or version < 1:
         raise ProjectError(f"{path} is an SQLite file but not a segmap project: choose a file that segmap has written.")
@@ -217,7 +261,7 @@ def _check(path: Path, connection: sqlite3.Connection) -> None:
             f" version {len(MIGRATIONS)}): update segmap and open it again."
         )
     if (damage := connection.execute("PRAGMA quick_check(1)").fetchone()[0]) != "ok":
-        raise ProjectError(_DAMAGED.format(path=path, error=damage.replace("\n", " ")))
+        raise ProjectError(_DAMAGED.format(path=path, error=_one_line(damage)))
     if _schema(connection) != _expected_schema(version):
         raise ProjectError(f"{path} is not a project as segmap writes them: its tables differ. Open a backup of it.")
 

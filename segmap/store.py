@@ -23,7 +23,15 @@ from pathlib import Path
 from tempfile import SpooledTemporaryFile
 from typing import IO, Any, BinaryIO, Self, TypeVar, cast
 
-from segmap._database import create_database, explained, open_database, reserved, transaction
+from segmap._database import (
+    create_database,
+    explained,
+    insert_event,
+    open_database,
+    reserved,
+    select_events,
+    transaction,
+)
 from segmap.errors import ProjectError
 from segmap.events import AddLog, Create, Event, LogInfo, Redo, Undo, event_from_json
 from segmap.parameters import Parameters
@@ -115,7 +123,7 @@ class Store:
     def events(self, after: int = 0) -> tuple[Event, ...]:
         """The history, in order; ``after``: only events with a larger sequence number."""
         with self._reading() as connection:
-            rows = connection.execute("SELECT seq, body FROM events WHERE seq > ? ORDER BY seq", (after,)).fetchall()
+            rows = select_events(self.path, connection, after)
         return tuple(self._event(*row) for row in rows)
 
     def append(self, event: _E, expected_revision: int | None = None) -> _E:
@@ -133,7 +141,7 @@ class Store:
             if expected_revision is not None:
                 check_conflict(state, event, expected_revision)
             recorded = _stamped(_resolved(event, state), state.revision + 1, expected_revision)
-            self._insert(recorded)
+            insert_event(self._connection, recorded.seq, recorded.model_dump_json())
         return recorded
 
     @contextmanager
@@ -146,9 +154,6 @@ class Store:
                 after = replay(self.events(after=before.revision), before)
             self._state = after  # only now is it on the disk
 
-    def _insert(self, event: Event) -> None:
-        self._connection.execute("INSERT INTO events VALUES (?, ?)", (event.seq, event.model_dump_json()))
-
     def _replayed(self, state: ProjectState) -> ProjectState:
         events = self.events(after=state.revision)
         try:
@@ -156,7 +161,7 @@ class Store:
         except ProjectError as error:
             raise ProjectError(f"The history of {self.path} cannot be replayed. {error}") from error
 
-    def _event(self, seq: int, body: str) -> Event:
+    def _event(self, seq: int, body: bytes) -> Event:
         try:
             return event_from_json(body)
         except ProjectError as error:
@@ -172,17 +177,17 @@ class Store:
         file = io.BytesIO(content) if isinstance(content, bytes) else content
         with self._recording() as state:
             seq = state.revision + 1
-            sha256, size = self._insert_chunks(seq, file)
+            sha256, size = self._insert_chunks(seq, _pieces(name, file))
             info = LogInfo(name=name, sha256=sha256, size=size, scans=scans, format=format)
-            self._insert(_stamped(AddLog(log=info, who=who), seq, None))
+            insert_event(self._connection, seq, _stamped(AddLog(log=info, who=who), seq, None).model_dump_json())
         return self._state.logs[len(state.logs)]
 
-    def _insert_chunks(self, seq: int, file: BinaryIO) -> tuple[str, int]:
-        digest, size, position = hashlib.sha256(), 0, 0
-        while chunk := file.read(CHUNK):
+    def _insert_chunks(self, seq: int, chunks: Iterable[bytes]) -> tuple[str, int]:
+        digest, size = hashlib.sha256(), 0
+        for position, chunk in enumerate(chunks):
             self._connection.execute("INSERT INTO chunks VALUES (?, ?, ?)", (seq, position, chunk))
             digest.update(chunk)
-            size, position = size + len(chunk), position + 1
+            size += len(chunk)
         return digest.hexdigest(), size
 
     def log_chunks(self, index: int) -> Iterator[bytes]:
@@ -225,7 +230,7 @@ class Store:
         with self._reading() as connection:
             query = "SELECT data FROM chunks WHERE event = ? AND position = ?"
             row = connection.execute(query, (event, position)).fetchone()
-        return bytes(row[0]) if row else None
+        return row[0] if row and isinstance(row[0], bytes) else None
 
     # results: a cache, never truth
 
@@ -301,6 +306,16 @@ class Store:
 
 _DROP_OLDEST = """DELETE FROM results WHERE number <= (SELECT coalesce(max(number), 0) FROM
     (SELECT number, sum(length(value)) OVER (ORDER BY number DESC) AS total FROM results) WHERE total > ?)"""
+
+
+def _pieces(name: str, file: BinaryIO) -> Iterator[bytes]:
+    try:
+        while piece := file.read(CHUNK):
+            yield piece
+    except OSError as error:
+        raise ProjectError(
+            f"{name} cannot be read to its end: {error.strerror or error}. Nothing of it was kept."
+        ) from error
 
 
 def _stamped(event: _E, seq: int, revision: int | None) -> _E:
