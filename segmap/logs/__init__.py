@@ -25,6 +25,8 @@ __all__ = ["FORMATS", "Limits", "LogSource", "base_name", "read_log"]
 FORMATS: tuple[Format, ...] = (CARMEN, DP_SLAM)
 """Every format read; the first that recognises a file reads it."""
 
+FAR = 100.0
+"""metres; a log most of whose readings are farther is not in metres"""
 PACKED = {
     b"PK\x03\x04": "a zip archive",
     b"BZh": "compressed with bzip2",
@@ -58,6 +60,7 @@ def read_log(source: LogSource, name: str | None = None, limits: Limits | None =
             raise LogError(f"{file.name} holds more than {file.limits.scans} scans: split it and read each part.")
         if file.damage:
             problems.add(_last_line(records), _damage(file))
+    _check_unit(records, problems)
     scans = _scans(records, silence := _silence(records), problems)
     if not scans:
         problems.add(1, f"{file.name} is a {format.name} log without laser scans: choose a log that has some")
@@ -79,11 +82,11 @@ def _format_of(head: bytes, file: LogFile) -> Format:
         if head.startswith(magic):
             raise LogError(f"{file.name} is {packed}: unpack it and give the log inside.")
     cut = f", and the file is {file.damage}" if file.damage else ""
-    first = head.split(b"\n", 1)[0].strip()
+    start = head.split(b"\n", 1)[0].strip()
+    found = "it is binary" if b"\0" in head else f"line 1 starts with {shown(start)}"
     expected = " or ".join(format.expects for format in FORMATS)
     raise LogError(
-        f"{file.name} is no laser log that segmap reads: line 1 starts with {shown(first)}{cut}."
-        f" Expected {expected}, plain or gzipped."
+        f"{file.name} is no laser log that segmap reads: {found}{cut}. Expected {expected}, plain or gzipped."
     )
 
 
@@ -93,6 +96,14 @@ def _last_line(records: Sequence[Record]) -> int:
 
 def _damage(file: LogFile) -> str:
     return f"the compressed data are {file.damage} after this line; what came before was read: fetch the file again"
+
+
+def _check_unit(records: Sequence[Record], problems: Problems) -> None:
+    """Ranges in millimetres would pass for walls hundreds of metres away."""
+    readings = sum(len(record.ranges) for record in records)
+    far = sum(int(np.count_nonzero(record.ranges > FAR)) for record in records)
+    if 2 * far > readings:
+        problems.add(records[0].line, f"most readings of this log are above {FAR:g}: convert them to metres")
 
 
 def _silence(records: Sequence[Record]) -> Mapping[tuple[str, int], NoReturn]:

@@ -44,6 +44,7 @@ class Limits:
     """decompressed bytes for each compressed one; laser logs have 3 to 10"""
     line: int = 2 * MEBIBYTE
     """bytes of one line"""
+    lines: int = 10_000_000
     scans: int = 500_000
 
 
@@ -96,6 +97,8 @@ class LogFile:
             line = self._buffer.readline(self.limits.line + 1)
             if not line or (self.damage and not line.endswith(b"\n")):
                 return
+            if number > self.limits.lines:
+                raise LogError(f"{self.name} has more than {self.limits.lines} lines: split it and read each part.")
             if len(line) > self.limits.line:
                 too_long(number, f"the line is longer than {_mebibytes(self.limits.line)} and was left out")
                 self._finish(line)

@@ -132,6 +132,12 @@ def test_strange_ranges(flaser):
     assert np.isnan(scan.ranges).tolist() == [False, True, True, True, True, True, True, False]
 
 
+def test_millimetres():
+    """Ranges that cannot be metres are told of, with the remedy."""
+    assert "convert them to metres" in str(read("FLASER 4 1200 2300 900 8191").problems[0])
+    assert read("FLASER 4 1.2 81.91 81.91 81.91").problems == ()
+
+
 def test_too_many_beams(flaser):
     """A record with more beams than any laser has is left out."""
     log = read(flaser(1.0), "FLASER 100001 " + "1 " * 100_001)
@@ -152,7 +158,7 @@ def test_no_scans():
 def test_no_log(content):
     """A file of another kind is refused in one sentence that says what was expected."""
     with pytest.raises(
-        LogError, match=r"^notes\.txt is no laser log .* line 1 starts with .* Expected CARMEN"
+        LogError, match=r"^notes\.txt is no laser log .* (line 1 starts with|it is binary).* Expected CARMEN"
     ) as error:
         read_log(content, "notes.txt")
     assert str(error.value).isprintable()

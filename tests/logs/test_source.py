@@ -134,7 +134,9 @@ def test_long_lines(small_log):
 
 
 def test_too_many_scans(small_log):
-    """A file of more scans than anybody can use is refused before it fills the memory."""
+    """A file of more scans or lines than anybody can use is refused before it fills the memory or the day."""
+    with pytest.raises(LogError, match="has more than 10 lines: split it"):
+        read_log(small_log, limits=Limits(lines=10))
     with pytest.raises(LogError, match="holds more than 5 scans"):
         read_log(small_log, limits=Limits(scans=5))
 
