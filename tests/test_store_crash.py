@@ -18,7 +18,7 @@ from segmap.errors import ProjectError
 from segmap.project import event_from_json
 from segmap.store import Store
 
-VICTIM = Path(__file__).with_name("store_victim.py")
+VICTIM = Path(__file__).parent / "helpers" / "store_victim.py"
 ROUNDS = int(os.environ.get("SEGMAP_CRASHES", "30"))
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="the victim is forked, which this system cannot do")

@@ -209,7 +209,8 @@ def test_a_file_another_program_writes_is_waited_for_and_then_said(path: Path) -
     with Store.open(path, patience=0.05) as store:
         before = store.events()
         with another_program_writing(path):
-            assert store.events() == before
+            with Store.open(path) as reader:
+                assert reader.events() == store.events() == before
             refused(path, lambda: store.append(Rename(name="x")), "is being written by another program")
             refused(path, lambda: store.add_log("x", b"x", scans=1), "is being written by another program")
         assert store.events() == before
