@@ -12,6 +12,7 @@ from pathlib import Path
 
 from segmap.errors import ExportError
 from segmap.export.components import Content, MapComponent
+from segmap.export.files import write_whole
 from segmap.export.geojson import write_geojson
 from segmap.export.svg import thumbnail, write_svg
 
@@ -75,14 +76,7 @@ def write_map(
     """
     target = Path(path)
     content = export_map(components, format or _by_suffix(target), metadata, integrations)
-    beside = target.with_name(f"{target.name}.part")
-    try:
-        beside.write_bytes(content)
-        beside.replace(target)
-    except OSError as error:
-        beside.unlink(missing_ok=True)
-        reason = (error.strerror or str(error)).lower()
-        raise ExportError(f"{target} cannot be written: {reason}. Choose another place.") from None
+    write_whole(target, content)
 
 
 def _format(name: str) -> ExportFormat:

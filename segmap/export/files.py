@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from segmap.errors import ExportError
@@ -22,6 +23,7 @@ def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
         beside.write_bytes(content)
         beside.replace(target)
     except OSError as error:
-        beside.unlink(missing_ok=True)
+        with suppress(OSError):
+            beside.unlink()
         reason = (error.strerror or str(error)).lower()
         raise ExportError(f"{target} cannot be written: {reason}. Choose another place.") from None

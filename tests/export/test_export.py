@@ -47,6 +47,9 @@ def test_write_refused(corner, tmp_path):
     with pytest.raises(ExportError, match="cannot be written: no such file or directory"):
         write_map([corner], tmp_path / "missing" / "map.svg")
     (tmp_path / "folder.svg").mkdir()
+    (tmp_path / "file").touch()
+    with pytest.raises(ExportError, match="cannot be written: not a directory"):
+        write_map([corner], tmp_path / "file" / "map.svg")
     with pytest.raises(ExportError, match="cannot be written"):
         write_map([corner], tmp_path / "folder.svg")
-    assert [path.name for path in tmp_path.iterdir()] == ["folder.svg"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder.svg"]

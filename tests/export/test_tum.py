@@ -1,0 +1,37 @@
+"""TUM trajectories, read back as numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from segmap.export.tum import trajectory
+from segmap.pose import Pose2
+
+POSES = [Pose2(0.0, 0.0, 0.0), Pose2(1.5, -2.0, 3.0), Pose2(-1.0, 0.25, -1.0)]
+
+
+def read_back(content: bytes) -> np.ndarray:
+    return np.loadtxt(content.decode().splitlines())
+
+
+def test_round_trip():
+    """Time, place and turn of every pose are read back, whatever the remarks."""
+    rows = read_back(trajectory(POSES, [10.0, 10.5, 12.0], ["component 1\nof 2"]))
+    assert rows[:, 0].tolist() == [10.0, 10.5, 12.0]
+    theta = 2.0 * np.arctan2(rows[:, 6], rows[:, 7])
+    assert np.column_stack((rows[:, 1:3], theta)) == pytest.approx(np.array([list(pose) for pose in POSES]), abs=1e-6)
+    assert (rows[:, 3:6] == 0.0).all()
+
+
+@pytest.mark.parametrize("times", [[1.0, None, 3.0], [1.0, 1.0, 2.0], [3.0, 2.0, 4.0]])
+def test_numbered_without_times(times):
+    """Times that are missing or do not grow are replaced by numbers, and the file says so."""
+    content = trajectory(POSES, times)
+    assert read_back(content)[:, 0].tolist() == [0.0, 1.0, 2.0]
+    assert b"# number x y z" in content
+
+
+def test_empty():
+    """No poses are a file of remarks."""
+    assert trajectory([], [], ["nothing"]).startswith(b"# nothing\n")
