@@ -6,14 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from app.jobs import Check, Latest
-from segmap.errors import CancelledError, ProjectError, SegmapError
+from app.resources import program_version
+from segmap.errors import CancelledError, ExportError, ProjectError, SegmapError
+from segmap.events import IntegrationId
+from segmap.export import export_map
 from segmap.merging import Component, map_hash, merge_accepted
 from segmap.parameters import Parameters
 from segmap.project import ProjectState, accepted
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 
-__all__ = ["Merged", "MergedMap", "map_parameters", "merge_project"]
+__all__ = ["Merged", "MergedMap", "export_project", "map_parameters", "merge_project"]
 
 Extractor = Callable[[ScanId, Parameters], SegmentMap]
 
@@ -50,6 +53,25 @@ def merge_project(
     reusable = previous.components if previous and previous.parameters == parameters else ()
     components = merge_accepted(maps, edges, state.parameters, previous=reusable, check=check)
     return Merged(state.revision, components, map_hash(components), parameters)
+
+
+def export_project(state: ProjectState, merged: Merged, format: str) -> bytes:
+    """The merged map of a project as the bytes of a file, which says where it comes from.
+
+    Raises:
+        ExportError: nothing is accepted, or there is no such format.
+    """
+    if not merged.components:
+        raise ExportError("There is nothing to export: accept at least one integration first.")
+    told = {
+        "title": state.name,
+        "version": program_version(),
+        "map_hash": merged.hash,
+        "revision": str(merged.revision),
+        "parameters": state.fingerprint,
+    }
+    integrations = [str(IntegrationId(first, second)) for first, second, _ in accepted(state)]
+    return export_map(merged.components, format, told, integrations)
 
 
 class MergedMap:

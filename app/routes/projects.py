@@ -19,7 +19,7 @@ from starlette.requests import Request
 
 from app.creation import Source
 from app.errors import UnknownError
-from app.resources import program_version
+from app.merged import export_project
 from app.routes.common import Opened, Site
 from app.schemas import (
     Component,
@@ -38,8 +38,7 @@ from app.schemas import (
 from app.session import Session
 from app.workspace import Summary
 from segmap.candidates import HEURISTICS
-from segmap.errors import ExportError
-from segmap.export import FORMATS, export_map
+from segmap.export import FORMATS
 from segmap.logs import base_name
 from segmap.merging import Component as MapComponent
 from segmap.parameters import PRESETS, describe
@@ -223,24 +222,8 @@ def export(session: Opened, format: str) -> Response:
     if format not in FORMATS:
         raise UnknownError(f"There is no export format {format[:80]!r}. Formats are: {', '.join(FORMATS)}.")
     state, merged = session.state, session.merged(MERGING_SECONDS)
-    if not merged.components:
-        raise ExportError("There is nothing to export: accept at least one integration first.")
-    told = {
-        "title": state.name,
-        "version": program_version(),
-        "map_hash": merged.hash,
-        "revision": str(merged.revision),
-        "parameters": state.fingerprint,
-    }
-    ids = [name for name in session.integrations if _accepted(state, name)]
-    kind = FORMATS[format]
-    content = export_map(merged.components, format, told, ids)
+    content, kind = export_project(state, merged, format), FORMATS[format]
     return Response(content, media_type=kind.media_type, headers=_attached(state.name, kind.suffix))
-
-
-def _accepted(state: ProjectState, integration: str) -> bool:
-    decision = state.decisions.get(integration)
-    return decision is not None and decision.verdict == "accepted"
 
 
 @router.get("/projects/{project}/download", response_class=FileResponse)
