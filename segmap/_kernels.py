@@ -16,6 +16,9 @@ from segmap.pose import FloatArray, IntArray
 
 __all__ = ["equal_angles", "evaluate", "first_of_each", "matching_pairs", "superimpose"]
 
+TOUCH = 1e-9
+"""metres; a segment whose extreme is this near to a line touches it, whatever the rounding"""
+
 _compiled = njit(cache=True, nogil=True, error_model="numpy")
 _inlined = njit(cache=True, nogil=True, error_model="numpy", inline="always")
 
@@ -150,6 +153,12 @@ def _common_length(t, u, length):  # type: ignore[no-untyped-def]
 
 
 @_inlined
+def _meets(start, end):  # type: ignore[no-untyped-def]
+    """Whether a segment with these signed distances from a line meets it, touching included."""
+    return min(start, end) <= TOUCH and max(start, end) >= -TOUCH
+
+
+@_inlined
 def _matching_value(s1, d1, s2, d2, limit, rate):  # type: ignore[no-untyped-def]
     """Matching value of two segments (lines 9 to 17); ``rate`` is log(penalty) / tolerance."""
     cx = s2[0] - s1[0]
@@ -169,7 +178,7 @@ def _matching_value(s1, d1, s2, d2, limit, rate):  # type: ignore[no-untyped-def
     l1 = _common_length(d1[0] * cx + d1[1] * cy, d1[0] * dx + d1[1] * dy, d1[2])
     l2 = _common_length(-(d2[0] * cx + d2[1] * cy), -(d2[0] * bx + d2[1] * by), d2[2])
     value = 0.5 * (l1 + l2)
-    if value > 0.0 and not (start_2 * end_2 <= 0.0 and start_1 * end_1 <= 0.0):
+    if value > 0.0 and not (_meets(start_2, end_2) and _meets(start_1, end_1)):
         value *= math.exp(rate * distance)
     return value
 
@@ -183,7 +192,7 @@ def _crosses(s1, d1, s2, d2, tolerance, sine_refuse):  # type: ignore[no-untyped
     end_2 = d1[0] * (s2[3] - s1[1]) - d1[1] * (s2[2] - s1[0])
     start_1 = d2[0] * (s1[1] - s2[1]) - d2[1] * (s1[0] - s2[0])
     end_1 = d2[0] * (s1[3] - s2[1]) - d2[1] * (s1[2] - s2[0])
-    if start_2 * end_2 > 0.0 or start_1 * end_1 > 0.0:
+    if not (_meets(start_2, end_2) and _meets(start_1, end_1)):
         return False
     along_2 = d2[2] * start_2 / (start_2 - end_2)
     along_1 = d1[2] * start_1 / (start_1 - end_1)
@@ -223,7 +232,7 @@ def evaluate(
     turned = np.empty_like(directions_2)
     limit = threshold * tolerance
     rate = math.log(penalty) / tolerance
-    sine_refuse = math.sin(refuse_angle)
+    sine_refuse = max(math.sin(refuse_angle), TOUCH)
     for k in range(len(poses)):
         _move(segments_2, directions_2, poses[k], moved, turned)
         if _contradicts(segments_1, directions_1, long_1, moved, turned, long_2, tolerance, sine_refuse):

@@ -153,11 +153,14 @@ def _distance(p: FloatArray, q: FloatArray) -> float:
 
 
 def _as_map(line: Polyline, members: SegmentMap, parameters: Parameters) -> SegmentMap:
-    """The edges of a polyline as a map."""
+    """The edges of a polyline as a map, without connectors that would claim a wall nobody saw."""
     edges = line.edges
     owners = _stands_for(edges, members.coordinates, line.vertices, parameters.fusion_tolerance)
     sources = tuple(_united(members, np.flatnonzero(column)) for column in owners.T)
-    return SegmentMap(edges, Order.NONE, np.full(len(edges), line.directed), sources)
+    whole = SegmentMap(edges, Order.NONE, np.full(len(edges), line.directed), sources)
+    if parameters.max_connector is None:
+        return whole
+    return whole.take(np.flatnonzero(owners.any(axis=0) | (whole.lengths <= parameters.max_connector)))
 
 
 def _stands_for(edges: FloatArray, segments: FloatArray, vertices: FloatArray, tolerance: float) -> IntArray:

@@ -86,6 +86,11 @@ class Match:
         """Value of the best candidate, metres; 0 where there is none."""
         return self.ranked[0].value if self.ranked else 0.0
 
+    @property
+    def score(self) -> float:
+        """What matches of one mode are ranked by: the value, metres."""
+        return self.value
+
     def judged(self, value_threshold: float) -> Match:
         """The same match, with its verdict by another threshold, in metres; nothing is searched again."""
         if not self.ranked:

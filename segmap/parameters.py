@@ -131,6 +131,14 @@ class Parameters(BaseModel):
         le=1000,
     )
 
+    max_connector: float | None = _parameter(
+        0.2,
+        "m",
+        "Longer edges of a polyline that stand for no segment are left out (none: the paper keeps all).",
+        ge=0.0,
+        le=100000.0,
+    )
+
     # merging (IV)
     pivot_form: Literal["scan", "pair"] = _parameter(
         "scan", "", "pivot: fuse each new scan (Algorithm 6), or each pair's map moved by its pivot (IV-C)."
@@ -170,6 +178,7 @@ _PAPER_LAB: dict[str, Any] = {
     "min_segment_length": 0.0,
     "point_distance_tolerance": 0.015,
     "refuse_angle": 0.0,
+    "max_connector": None,
 }
 
 PRESETS: dict[str, Parameters] = {

@@ -19,6 +19,8 @@ from segmap.scans import LaserScan
 
 LEAST_LENGTH = 1e-9
 """metres; what is shorter is a point"""
+FARTHEST = 1e8
+"""metres; no map reaches farther from its origin"""
 
 __all__ = ["Order", "SegmentMap", "Source", "extract"]
 
@@ -50,7 +52,7 @@ class SegmentMap:
     Segments are directed so that free space is on their left, unless ``directed`` says otherwise.
 
     Raises:
-        MapError: wrong shapes, coordinates that are not finite, or a segment without length.
+        MapError: wrong shapes, coordinates that are not finite or absurdly large, or a segment without length.
     """
 
     coordinates: FloatArray
@@ -135,9 +137,10 @@ def _checked_coordinates(coordinates: ArrayLike) -> FloatArray:
         array = array.reshape(0, 4)
     if array.ndim != 2 or array.shape[1] != 4:
         raise MapError(f"Segments must be rows of x1, y1, x2, y2; these have the shape {array.shape}.")
-    if not np.isfinite(array).all():
-        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise MapError(f"Segment {row} has a coordinate that is not a finite number.")
+    usable = np.abs(array) <= FARTHEST  # false for NaN
+    if not usable.all():
+        row = int(np.flatnonzero(~usable.all(axis=1))[0])
+        raise MapError(f"Segment {row} has a coordinate that is not a number of metres within {FARTHEST:.0e}.")
     short = np.flatnonzero(np.hypot(*(array[:, 2:] - array[:, :2]).T) <= LEAST_LENGTH)
     if len(short):
         raise MapError(f"Segment {short[0]} has no length: its two extremes are the same point.")

@@ -128,6 +128,7 @@ def test_joined_maps_keep_everything(map_1, map_2):
     [
         ([[0, 0, 1]], "rows of x1, y1, x2, y2"),
         ([[0, 0, 1, np.nan]], "Segment 0 has a coordinate"),
+        ([[0, 0, 1, 1], [0, 0, 1, -1e308]], "Segment 1 has a coordinate"),
         ([[0, 0, 1, 1], [2, 2, 2, 2]], "Segment 1 has no length"),
     ],
 )

@@ -4,6 +4,8 @@ The twin of the compiled kernels: written from the paper and its reading, on com
 nothing of the library in it but the maps and the parameters.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from segmap.parameters import Parameters
@@ -50,7 +52,7 @@ def pairs_of(segment_map: SegmentMap, heuristic: str, p: Parameters):
         return [(i, j) for i, j in near if i in long and j in long]
     kept = long if p.consecutive_over_short else list(range(n))
     ring = [(kept[-1], kept[0])] if segment_map.order is Order.RING and len(kept) > 2 else []
-    return [(i, j) for i, j in [*zip(kept[:-1], kept[1:], strict=True), *ring] if i in long and j in long]
+    return [(i, j) for i, j in [*pairwise(kept), *ring] if i in long and j in long]
 
 
 def angles_of(segment_map, pairs, p):
@@ -101,6 +103,11 @@ def line_distance(start, end, point):
     return ((point - start) * unit.conjugate()).imag
 
 
+def meets(a, b):
+    """Whether a segment meets a line from which its extremes have these signed distances; touching to 1e-9 m."""
+    return (np.sign(a) != np.sign(b)) | (abs(a) <= 1e-9) | (abs(b) <= 1e-9)
+
+
 def common(start, end, a, b):
     """Length of the part of (start, end) that the projection of (a, b) covers."""
     length = abs(end - start)
@@ -122,7 +129,7 @@ def _values(map_1, map_2, poses, p):
     to_1 = line_distance(s1, e1, s2), line_distance(s1, e1, e2)
     to_2 = line_distance(s2, e2, s1), line_distance(s2, e2, e1)
     both = (common(s1, e1, s2, e2) + common(s2, e2, s1, e1)) / 2
-    straddle = (to_1[0] * to_1[1] <= 0) & (to_2[0] * to_2[1] <= 0)
+    straddle = meets(*to_1) & meets(*to_2)
     distance = np.minimum(np.maximum(*map(abs, to_1)), np.maximum(*map(abs, to_2)))
     ratio = distance / p.point_distance_tolerance
     matching = np.where(straddle, both, both * p.distance_penalty**ratio)
@@ -139,4 +146,5 @@ def _discarded(s1, e1, s2, e2, to_1, straddle, p):
     with np.errstate(invalid="ignore", divide="ignore"):
         point = s2 + (e2 - s2) * to_1[0] / (to_1[0] - to_1[1])
         clear = np.minimum.reduce([abs(point - x) for x in np.broadcast_arrays(s1, e1, s2, e2)])
-        return (long & straddle & (acute > p.refuse_angle) & (clear > p.point_distance_tolerance)).any(axis=(1, 2))
+        crossing = straddle & (acute > max(p.refuse_angle, 1e-9)) & (clear > p.point_distance_tolerance)
+    return (long & crossing).any(axis=(1, 2))
