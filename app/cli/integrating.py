@@ -1,0 +1,77 @@
+"""``integrate``: two scans of a log."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from app.cli.options import (
+    DEFAULT_HEURISTIC,
+    DEFAULT_MODE,
+    Heuristic,
+    Json,
+    Log,
+    Mode,
+    Preset,
+    Setting,
+    parameters_of,
+    read,
+)
+from app.cli.output import pose_json, print_facts, print_json, show_pose
+from segmap.integration import Match, match_maps
+from segmap.segments import extract
+
+__all__ = ["integrate"]
+
+
+def integrate(
+    log: Log,
+    first: Annotated[int, typer.Argument(metavar="I", help="Index of the first scan, from 0.", show_default=False)],
+    second: Annotated[int, typer.Argument(metavar="J", help="Index of the second scan.", show_default=False)],
+    mode: Mode = DEFAULT_MODE,
+    heuristic: Heuristic = DEFAULT_HEURISTIC,
+    preset: Preset = "default",
+    settings: Setting = None,
+    as_json: Json = False,
+) -> None:
+    """Find the pose of scan J in the frame of scan I, from their segments alone."""
+    laser_log, parameters = read(log), parameters_of(preset, settings)
+    map_1, map_2 = (extract(laser_log.scan(index), parameters, index=index) for index in (first, second))
+    match = match_maps(map_1, map_2, parameters, heuristic, mode)
+    if as_json:
+        print_json({"log": laser_log.name, "scans": [first, second], **_document(match)})
+    else:
+        print_facts(_facts(match, first, second))
+
+
+def _document(match: Match) -> dict[str, Any]:
+    draws = {} if match.draws is None else {"draws": match.draws}
+    return {
+        "pose": pose_json(match.T_1_2),
+        "value": match.value,
+        "mode": match.mode,
+        "heuristic": match.heuristic,
+        "candidates": match.candidates,
+        **draws,
+        "discarded": match.discarded,
+        "verdict": str(match.verdict),
+        "reasons": list(match.reasons),
+        "chains": [[list(pair[:2]) for pair in chain.pairs] for chain in match.chains],
+        "segments": list(match.segments),
+        "milliseconds": match.milliseconds,
+    }
+
+
+def _facts(match: Match, first: int, second: int) -> dict[str, object]:
+    draws = "" if match.draws is None else f" of {match.draws} draws"
+    return {
+        "verdict": match.verdict,
+        "reasons": " ".join(match.reasons),
+        f"pose of {second} in {first}": show_pose(match.T_1_2),
+        "value": f"{match.value:.3f} m",
+        "chains": f"{len(match.chains)}, of {sum(len(chain.pairs) for chain in match.chains)} pairs of segments",
+        "candidates": f"{match.candidates}{draws}, {match.discarded} discarded ({match.mode}, {match.heuristic})",
+        "segments": " and ".join(map(str, match.segments)),
+        "time": f"{match.milliseconds:.1f} ms",
+    }

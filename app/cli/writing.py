@@ -1,0 +1,98 @@
+"""What the commands leave on disk: maps, trajectories, projects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import typer
+
+from app.inputs import facts_of, remember
+from app.resources import program_version
+from segmap.errors import ExportError, LogError
+from segmap.events import Choice, Decide, IntegrationId, fingerprint
+from segmap.export import FORMATS
+from segmap.export.files import write_whole
+from segmap.export.tum import trajectory
+from segmap.integration import Match
+from segmap.merging import Component
+from segmap.parameters import Parameters
+from segmap.scans import LaserLog, ScanId
+from segmap.store import Store
+
+__all__ = ["checked_suffix", "described", "listed", "new_project", "write_trajectory"]
+
+COMMAND = "segmap merge"
+"""who decided, in the history of a project"""
+
+
+def checked_suffix(path: Path) -> None:
+    """Raises ExportError where a file's suffix names no format."""
+    suffixes = [format.suffix for format in FORMATS.values()]
+    if path.suffix.lower() not in suffixes:
+        raise ExportError(f"{path} does not say its format: let the name end in one of {', '.join(suffixes)}.")
+
+
+def described(title: str, hash: str) -> dict[str, str]:
+    """What a map's file says of itself."""
+    return {"title": title, "version": program_version(), "map_hash": hash}
+
+
+def listed(scans: Iterable[ScanId]) -> str:
+    """Scans, for people."""
+    return ", ".join(map(str, scans))
+
+
+def write_trajectory(path: Path, components: Sequence[Component], logs: Sequence[LaserLog]) -> None:
+    """The poses of the largest component; the scans of the others have other frames, and are listed."""
+    largest = max(components, key=lambda component: len(component.scans), default=None)
+    remarks = [f"not in this frame: {c.name}, scans {listed(sorted(c.scans))}" for c in components if c is not largest]
+    for remark in remarks:
+        typer.echo(f"segmap: {path.name}: {remark}", err=True)
+    scans = sorted(largest.scans) if largest else []
+    poses = [largest.poses[scan] for scan in scans] if largest else []
+    times = [_time(logs, scan) for scan in scans]
+    write_whole(path, trajectory(poses, times, remarks))
+
+
+def _time(logs: Sequence[LaserLog], scan: ScanId) -> float | None:
+    return logs[scan.log][scan.scan].time
+
+
+def new_project(
+    path: Path,
+    name: str,
+    logs: Sequence[tuple[Path, LaserLog]],
+    parameters: Parameters,
+    heuristic: str,
+    mode: str,
+    accepted: Mapping[IntegrationId, Match],
+) -> None:
+    """A project of some logs in which these integrations are accepted, and everything else is for a person."""
+    with Store.create(path, name, parameters, heuristic, mode, who=COMMAND) as store:
+        for file, log in logs:
+            info = store.add_log(log.name, _content(file), scans=len(log), format=log.format, who=COMMAND)
+            remember(store, info.sha256, facts_of(log))
+        choices = tuple(_choice(integration, match, parameters) for integration, match in accepted.items())
+        if choices:
+            store.append(Decide(choices=choices, who=COMMAND, reason="accepted without asking"))
+
+
+def _content(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise LogError(f"{file} cannot be read: {(error.strerror or str(error)).lower()}.") from None
+
+
+def _choice(integration: IntegrationId, match: Match, parameters: Parameters) -> Choice:
+    return Choice(
+        integration=str(integration),
+        verdict="accepted",
+        parameters=fingerprint(parameters),
+        T_1_2=match.T_1_2,
+        value=match.value,
+        heuristic=match.heuristic,
+        mode=match.mode,
+        candidate=0,
+    )
