@@ -149,11 +149,8 @@ def _outcome(pair: Pair, log: LaserLog, parameters: Parameters, heuristic: str, 
     started = time.perf_counter()
     match = match_maps(extract(scan_1, parameters), extract(scan_2, parameters), parameters, heuristic, mode)
     milliseconds = 1000.0 * (time.perf_counter() - started)
-    if pair.kind == NEGATIVE:
-        right = match.verdict is not Verdict.ACCEPTED
-    else:
-        right = is_right(match.T_1_2, pair.truth)
-    return Outcome(pair, match, right, milliseconds)
+    refused = pair.kind == NEGATIVE and match.verdict is not Verdict.ACCEPTED
+    return Outcome(pair, match, refused or is_right(match.T_1_2, pair.truth), milliseconds)
 
 
 def score(name: str, outcomes: Sequence[Outcome]) -> LogScore:

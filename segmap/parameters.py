@@ -118,7 +118,7 @@ class Parameters(BaseModel):
 
     # fusion (III-C)
     fusion_tolerance: float = _parameter(
-        0.015, "m", "Farthest a matched segment may lie from the polyline that replaces it (III-C).", gt=0.0, le=1.0
+        0.05, "m", "Farthest a matched segment may lie from the polyline that replaces it (III-C).", gt=0.0, le=1.0
     )
     fusion_variant: Literal["greedy", "plain"] = _parameter(
         "greedy", "", "greedy: each segment enters the polyline at most once; plain: it may enter again (Fig. 5)."
@@ -178,6 +178,7 @@ _PAPER_LAB: dict[str, Any] = {
     "min_segment_length": 0.0,
     "point_distance_tolerance": 0.015,
     "refuse_angle": 0.0,
+    "fusion_tolerance": 0.015,
     "max_connector": None,
 }
 

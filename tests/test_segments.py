@@ -1,6 +1,7 @@
 """Laws of segment maps and of their extraction from scans."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ def test_extraction_is_clustering_then_splitting(ranges, tolerance):
     points, _ = LaserScan(uneven, -math.pi / 2, STEP).returns()
     chunks = clusters(points, 0.2)
     expected = [split(c, tolerance) for c in chunks if len(c) > 1]
-    rows = [np.concatenate((a, b)) for corners in expected for a, b in zip(corners[:-1], corners[1:], strict=True)]
+    rows = [np.concatenate((a, b)) for corners in expected for a, b in pairwise(corners)]
     assert approximate(chunks, tolerance) == pytest.approx(np.reshape(rows, (-1, 4)), abs=1e-9)
 
 
