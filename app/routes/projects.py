@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections import Counter
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Annotated, Any
 from urllib.parse import quote
@@ -84,13 +85,18 @@ def _url(id: str) -> str:
     return f"/projects/{quote(id)}"
 
 
-async def _what_to_make(request: Request) -> list[UploadFile] | SampleChoice:
-    """Uploaded files, spooled to disk as they come in; or the name of a sample."""
+async def _what_to_make(request: Request) -> AsyncIterator[list[UploadFile] | SampleChoice]:
+    """Uploaded files, spooled to disk as they come in and gone afterwards; or the name of a sample."""
     if request.headers.get("content-type", "").startswith("multipart/form-data"):
-        form = await request.form(max_files=FILES, max_fields=FILES)
-        return [file for file in form.getlist("files") if isinstance(file, UploadFile)]
+        async with request.form(max_files=FILES, max_fields=FILES) as form:
+            yield [file for file in form.getlist("files") if isinstance(file, UploadFile)]
+    else:
+        yield _sample_choice(await request.body())
+
+
+def _sample_choice(body: bytes) -> SampleChoice:
     try:
-        return SampleChoice.model_validate_json(await request.body())
+        return SampleChoice.model_validate_json(body)
     except ValidationError as error:
         raise RequestValidationError(error.errors()) from None
 
