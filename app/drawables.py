@@ -55,6 +55,8 @@ class Drawable:
     colours: NDArray[np.uint8] | None = None
     """points only: one colour for each, shape (n, 3)"""
     text: str = ""
+    anchor: Literal["bottom-center", "top-center", "center-left"] = "center-left"
+    """where a label has its place"""
     source: str = ""
     """where a click on a line leads: the source of a Pick; empty: nowhere"""
     segments: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
@@ -97,13 +99,20 @@ def points(flat: ArrayLike) -> Array32:
 
 
 def label(
-    name: str, layer: str, text: str, at: Iterable[float], colour: RGB, frame: Frame = "first", depth: int = 0
+    name: str,
+    layer: str,
+    text: str,
+    at: Iterable[float],
+    colour: RGB,
+    frame: Frame = "first",
+    depth: int = 0,
+    anchor: Literal["bottom-center", "top-center", "center-left"] = "center-left",
 ) -> Drawable:
     """A word at a place (x, y) or (x, y, z)."""
     place = np.zeros(3, np.float32)
     coordinates = list(at)
     place[: len(coordinates)] = coordinates
-    return Drawable(name, layer, "label", place, colour, frame, depth, text=text)
+    return Drawable(name, layer, "label", place, colour, frame, depth, text=text, anchor=anchor)
 
 
 def dashes(start: FloatArray, end: FloatArray) -> FloatArray:

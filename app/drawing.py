@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from app import map_layers, pair_layers
+from app import grid, map_layers, pair_layers
 from app.content import Content, Pair
 from app.drawables import Box, Drawable, Frame, label, lines
 from app.palette import RGB
@@ -60,10 +60,6 @@ class Picture:
     theme: str
     subject: tuple[str, ...]
     """what is looked at: when it changes, the camera should fit again"""
-
-    def visible(self, layer: str) -> bool:
-        """Whether a layer is there and drawn."""
-        return any(one.name == layer and one.visible for one in self.layers)
 
 
 def draw(content: Content) -> Picture:
@@ -177,11 +173,6 @@ def _component_colours(content: Content) -> tuple[RGB, ...]:
     return tuple(map_layers.component_colour(content, k) for k in range(max(1, min(6, len(content.placed)))))
 
 
-def _nothing(_: Content) -> Iterator[Drawable]:
-    """A layer that the scene draws by itself."""
-    return iter(())
-
-
 _KINDS = {
     "first": _Kind(
         "First scan",
@@ -245,7 +236,7 @@ _KINDS = {
     "trajectory": _Kind(
         "Trajectory", "m", map_layers.trajectory, lambda _: "where the accepted scans were taken", _component_colours
     ),
-    "grid": _Kind("Grid", "m", _nothing, lambda _: "squares of 1 m, bold every 5 m", _colours("neutral")),
+    "grid": _Kind("Grid", "m", grid.draw, grid.caption, _colours("neutral")),
 }
 LAYERS = tuple(_KINDS)
 """Names of all layers."""

@@ -19,9 +19,9 @@ __all__ = ["candidate_points", "component_colour", "components", "pair_in_map", 
 
 COMPONENT_COLOURS = (2, 6, 3, 5, 4)
 """of the palette's chains; its blue and orange are the pair's"""
-HEIGHT = 0.5
+HEIGHT = 0.35
 """height of a full turn in the space of poses, as a share of the width of what is drawn"""
-BAR = 0.2
+BAR = 0.12
 """height of the best value, as a share of the same"""
 FLOOR = 0.05
 """gap between the plane and the space of poses, as a share of the same"""

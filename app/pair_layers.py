@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from typing import Literal
 
 import numpy as np
 
@@ -39,7 +40,7 @@ def _segments(which: int) -> Callable[[Content], Iterator[Drawable]]:
             frame,
             "lines",
             lines(segment_map.coordinates),
-            palette.faint(colour, 0.4) if behind else colour,
+            palette.faint(colour, 0.55) if behind else colour,
             frame,
             depth=4 + which,
             thickness=1.5 if behind else 2.5,
@@ -74,7 +75,10 @@ def sensors(content: Content) -> Iterator[Drawable]:
     outline = np.concatenate((SENSOR, np.roll(SENSOR, -1, axis=0)), axis=1)
     for frame, name, colour in zip(FRAMES, content.pair.names, (palette.first, palette.second), strict=True):
         yield Drawable("sensor", "sensors", "lines", lines(outline), colour, frame, depth=11, thickness=3.0)
-        yield label("sensor/label", "sensors", name, (0.35, 0.0), colour, frame, depth=12)
+        over = frame == "first"
+        anchor: Literal["bottom-center", "top-center"] = "bottom-center" if over else "top-center"
+        at = (0.0, 0.25 if over else -0.25)
+        yield label("sensor/label", "sensors", name, at, colour, frame, depth=12, anchor=anchor)
 
 
 def angle(content: Content) -> Iterator[Drawable]:
@@ -144,7 +148,7 @@ def chains(content: Content) -> Iterator[Drawable]:
     for colour in range(min(len(palette.chains), len(pair.chains))):
         same = [pair.chains[k] for k in pair.by_value[colour :: len(palette.chains)]]
         members = ([i for c in same for i in c.first], [j for c in same for j in c.second])
-        for frame, segment_map, rows, thickness in zip(FRAMES, pair.maps, members, (5.0, 3.0), strict=True):
+        for frame, segment_map, rows, thickness in zip(FRAMES, pair.maps, members, (4.5, 2.5), strict=True):
             yield Drawable(
                 f"chains/{colour + 1}",
                 "chains",

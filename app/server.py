@@ -18,6 +18,7 @@ from rich.text import Text
 from starlette.concurrency import run_in_threadpool
 from starlette.staticfiles import StaticFiles
 
+from app import proxy
 from app.errors import RequestError
 from app.failures import answer_failures
 from app.jobs import WarmUp
@@ -37,7 +38,7 @@ NEXT_PORTS = 20
 REAP_SECONDS = 10.0
 GRACE_SECONDS = 3
 SOCKET_BYTES = 64 * 1024 * 1024
-ROUTERS = (pages.router, projects.router, review.router, stream.router, views.router)
+ROUTERS = (pages.router, projects.router, review.router, stream.router, views.router, proxy.router)
 
 
 def create_app(

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from app.actions import perform
 from app.content import Content
 from app.drawables import Pick
-from app.drawing import LAYERS, STAGES, Picture, draw
+from app.drawing import LAYERS, STAGES, Picture, draw, layers
 from app.errors import RequestError, UnknownError
 from app.evidence import Evidence
 from app.listeners import Listeners
@@ -177,11 +177,15 @@ class View:
 
     def toggle_layer(self, layer: str) -> None:
         """Draw a layer of this stage, or stop drawing it."""
+        with self._acting:
+            shown = {one.name: one.visible for one in layers(self.content())}
+            self.switch_layer(layer, not shown.get(layer, False))
+
+    def switch_layer(self, layer: str, on: bool) -> None:
+        """Draw a layer of this stage or not."""
         _known(layer, LAYERS, "layer")
         with self._acting:
-            shown = {one.name: one.visible for one in self.picture().layers}
-            if layer in shown:
-                self._look(self._looks.switch(layer, not shown[layer]))
+            self._look(self._looks.switch(layer, on))
 
     def set_dimension(self, dimension: int) -> None:
         """Look straight down (2) or from the side (3)."""

@@ -1,0 +1,166 @@
+"""One origin: the scene's viser server behind our own address.
+
+    GET  /views/{view}/scene/     viser's page, with our policy and our script
+    GET  /views/{view}/scene/...  whatever else it asks for
+    WS   /views/{view}/scene      its socket: the page drops the last slash
+
+viser itself knows no origins: what a foreign page must not do is stopped here.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Coroutine
+from functools import lru_cache
+from typing import Any
+from urllib.parse import quote
+
+import httpx
+from fastapi import APIRouter, Request, Response, WebSocket
+from starlette.websockets import WebSocketDisconnect, WebSocketState
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, WebSocketException
+from websockets.typing import Subprotocol
+
+from app.errors import RequestError, UnknownError
+from app.routes.common import Site
+from app.security import own_origin
+
+__all__ = ["POLICY", "SCRIPT", "router"]
+
+HOST = "127.0.0.1"
+QUERY = frozenset({"darkMode", "fixedDpr"})
+"""what may stand in the page's address; viser would also take another server to obey from there"""
+POLICY = (
+    "default-src 'none'; connect-src 'self' blob: data:; script-src 'self' 'unsafe-inline' 'unsafe-eval' "
+    "'wasm-unsafe-eval' blob:; worker-src blob:; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+    "font-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+"""viser needs inline and evaluated scripts; nothing is loaded from, or sent to, another origin"""
+SCRIPT = b"""<script>
+(() => {
+  // In 2D (a field of view of one degree) every drag moves the map, and no key turns the camera.
+  const moves = /^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/;
+  const viewer = () => window.__viserMutable ?? {};
+  const flat = () => viewer().camera?.fov < 5;
+  const set = (held, name, value) => { if (held && held[name] !== value) held[name] = value; };
+  addEventListener("keydown", (event) => {
+    if (!flat() || !moves.test(event.code) || event.target.closest?.("input, textarea")) return;
+    event.stopImmediatePropagation();
+  }, true);
+  setInterval(() => {
+    const control = viewer().cameraControl, held = flat();
+    if (!control || !viewer().camera) return;
+    set(control.mouseButtons, "left", held ? 2 : 1);
+    set(control.touches, "one", held ? 128 : 64);
+    set(control, "dollyToCursor", held);
+  }, 100);
+})();
+</script>
+"""
+"""put into viser's page; uses its own test hook, so viser's version is pinned"""
+
+router = APIRouter(prefix="/views/{view}/scene", include_in_schema=False)
+
+
+@router.get("/")
+async def page(site: Site, view: str, request: Request) -> Response:
+    """viser's page.
+
+    Raises:
+        RequestError: the address would make the page do something else than show this view.
+    """
+    foreign = sorted(set(request.query_params) - QUERY)
+    if foreign:
+        raise RequestError(
+            f"The scene takes no {foreign[0][:40]!r} in its address; it takes {', '.join(sorted(QUERY))}."
+        )
+    answer = await _fetch(site.views.get(view).scene.port, "/")
+    return Response(_with_script(answer.content), media_type="text/html", headers={"Content-Security-Policy": POLICY})
+
+
+@router.get("/{path:path}")
+async def asset(site: Site, view: str, path: str) -> Response:
+    """Anything else of viser's page."""
+    answer = await _fetch(site.views.get(view).scene.port, "/" + quote(path))
+    kind = answer.headers.get("content-type")
+    return Response(answer.content, answer.status_code, media_type=kind, headers={"Content-Security-Policy": POLICY})
+
+
+@router.websocket("")
+async def socket(site: Site, view: str, browser: WebSocket) -> None:
+    """viser's socket, for pages of our own origin; the view stays open as long as it is."""
+    if not own_origin(browser.headers):
+        await browser.close(1008)
+        return
+    try:
+        with site.views.watched(view) as opened:
+            await _bridge(browser, opened.scene.port)
+    except UnknownError:
+        await browser.close(1008)
+
+
+async def _fetch(port: int, path: str) -> httpx.Response:
+    """A file of a viser server.
+
+    Raises:
+        UnknownError: it does not answer.
+    """
+    try:
+        async with httpx.AsyncClient(trust_env=False, verify=False) as client:
+            return await client.get(f"http://{HOST}:{port}{path}")
+    except httpx.HTTPError:
+        raise UnknownError("The scene of this view is closed: load the page again.") from None
+
+
+@lru_cache(maxsize=2)
+def _with_script(html: bytes) -> bytes:
+    """The page with our script as the first thing in its head."""
+    before, head, after = html.partition(b"<head>")
+    return before + head + SCRIPT + after
+
+
+async def _bridge(browser: WebSocket, port: int) -> None:
+    """Pass messages both ways until either side goes."""
+    offered = [Subprotocol(name) for name in browser.scope.get("subprotocols", ())]
+    try:
+        async with connect(
+            f"ws://{HOST}:{port}", subprotocols=offered or None, compression=None, max_size=None, proxy=None
+        ) as viser:
+            await browser.accept(viser.subprotocol)
+            await _first_of(_outwards(browser, viser), _inwards(viser, browser))
+    except (OSError, TimeoutError, WebSocketException):
+        pass  # viser is gone, or would not have us: the browser is told below
+    if browser.client_state is not WebSocketState.DISCONNECTED:
+        await browser.close(1001)
+
+
+async def _first_of(*works: Coroutine[Any, Any, None]) -> None:
+    """Do several things until one of them is done; stop the others then."""
+    tasks = [asyncio.create_task(work) for work in works]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def _outwards(browser: WebSocket, viser: ClientConnection) -> None:
+    try:
+        while (message := await browser.receive())["type"] == "websocket.receive":
+            held = message.get("bytes")
+            await viser.send(message["text"] if held is None else held)
+    except (ConnectionClosed, WebSocketDisconnect):
+        pass
+
+
+async def _inwards(viser: ClientConnection, browser: WebSocket) -> None:
+    try:
+        async for message in viser:
+            if isinstance(message, str):
+                await browser.send_text(message)
+            else:
+                await browser.send_bytes(message)
+    except (ConnectionClosed, WebSocketDisconnect, RuntimeError):
+        pass  # RuntimeError: the browser went while something was on its way

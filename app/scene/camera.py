@@ -1,0 +1,131 @@
+"""Where the camera of each browser stands.
+
+There is no orthographic camera: 2D is a field of view of one degree from far away, straight down.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from typing import TypeAlias
+
+import numpy as np
+import viser
+
+from app.drawables import Box
+from app.drawing import Picture
+from segmap.pose import FloatArray
+
+__all__ = ["Cameras", "reach", "stand"]
+
+Triple: TypeAlias = tuple[float, float, float]
+
+FIELD_OF_VIEW = {2: math.radians(1.0), 3: math.radians(45.0)}
+MARGIN = 1.12
+MOVED = 1e-3
+"""of the distance: a camera farther from where it was put was moved by a person"""
+SLANT = np.array([-0.45, -0.75, 0.75])
+"""where a 3D camera stands, seen from what it looks at"""
+RAISED, ROOM = 0.18, 1.25
+"""in 3D: how high the camera looks, in widths, and how much farther away it stands, to see the space of poses too"""
+PICK_PIXELS = 10.0
+
+
+class Cameras:
+    """Fits the cameras of all browsers to what is shown, and again when their windows change."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._lock = threading.Lock()
+        self._picture: Picture | None = None
+        self._fits = -1
+        self._put: dict[int, tuple[float, Triple]] = {}
+
+    def follow(self, picture: Picture, fits: int) -> None:
+        """Fit all cameras if something else is looked at, from another side, or if somebody asked for it."""
+        with self._lock:
+            before, self._picture = self._picture, picture
+            asked, self._fits = fits != self._fits, fits
+        changed = before is None or (before.subject, before.dimension) != (picture.subject, picture.dimension)
+        if changed or asked:
+            self._begin(picture)
+            for client in self._server.get_clients().values():
+                self.fit(client)
+
+    def _begin(self, picture: Picture) -> None:
+        """How browsers that connect from now on start."""
+        camera = self._server.initial_camera
+        position, look_at, up = stand(picture.bounds, picture.dimension, 16.0 / 9.0)
+        camera.fov = FIELD_OF_VIEW[picture.dimension]
+        distance = float(np.linalg.norm(np.subtract(position, look_at)))
+        camera.near, camera.far = near_far(distance)
+        camera.up, camera.look_at, camera.position = up, look_at, position
+
+    def welcome(self, client: viser.ClientHandle) -> None:
+        """Fit a browser that has just connected, and look out for changes of its window."""
+        self.fit(client)
+        client.camera.on_update(lambda camera: self._keep_fitted(camera.client))
+
+    def forget(self, client: viser.ClientHandle) -> None:
+        """A browser has gone."""
+        with self._lock:
+            self._put.pop(client.client_id, None)
+
+    def fit(self, client: viser.ClientHandle) -> None:
+        """Bring everything into one browser's sight."""
+        with self._lock:
+            picture = self._picture
+            if picture is None:
+                return
+            aspect = client.camera.aspect
+            position, look_at, up = stand(picture.bounds, picture.dimension, aspect)
+            self._put[client.client_id] = (aspect, position)
+        distance = float(np.linalg.norm(np.subtract(position, look_at)))
+        with client.atomic():
+            client.camera.fov = FIELD_OF_VIEW[picture.dimension]
+            client.camera.near, client.camera.far = near_far(distance)
+            client.camera.max_orbit_distance = 20.0 * distance
+            client.camera.up_direction = up
+            client.camera.position = position
+            client.camera.look_at = look_at
+
+    def _keep_fitted(self, client: viser.ClientHandle) -> None:
+        """Fit again when the window's shape changed, unless a person has moved the camera."""
+        with self._lock:
+            aspect, position = self._put.get(client.client_id, (0.0, (0.0, 0.0, 0.0)))
+        if abs(client.camera.aspect - aspect) < 1e-3:
+            return
+        distance = float(np.linalg.norm(np.subtract(position, client.camera.look_at)))
+        if float(np.linalg.norm(np.subtract(position, client.camera.position))) <= MOVED * distance:
+            self.fit(client)
+
+
+def stand(bounds: Box, dimension: int, aspect: float) -> tuple[Triple, Triple, Triple]:
+    """Position, point looked at and up direction of a camera that sees a box."""
+    left, bottom, right, top = bounds
+    x, y = (left + right) / 2.0, (bottom + top) / 2.0
+    half = max(top - bottom, (right - left) / max(aspect, 1e-3), 1.0) / 2.0 * MARGIN
+    distance = half / math.tan(FIELD_OF_VIEW[dimension] / 2.0)
+    if dimension == 2:
+        return (x, y, distance), (x, y, 0.0), (0.0, 1.0, 0.0)
+    centre = np.array([x, y, RAISED * max(right - left, top - bottom)])
+    position = centre + ROOM * distance * SLANT / np.linalg.norm(SLANT)
+    return _triple(position), _triple(centre), (0.0, 0.0, 1.0)
+
+
+def _triple(point: FloatArray) -> Triple:
+    x, y, z = point
+    return float(x), float(y), float(z)
+
+
+def near_far(distance: float) -> tuple[float, float]:
+    """Clipping planes for a camera at a distance from what it looks at, with room to come nearer and go away."""
+    return distance / 200.0, distance * 25.0
+
+
+def reach(client: viser.ClientHandle) -> float:
+    """How far from a click something may be and is still meant, metres."""
+    camera = client.camera
+    distance = float(np.linalg.norm(np.subtract(camera.position, camera.look_at)))
+    pixel = 2.0 * distance * math.tan(camera.fov / 2.0) / max(1, camera.image_height)
+    return PICK_PIXELS * pixel
