@@ -23,7 +23,7 @@ from app.cli.options import (
     read,
 )
 from app.cli.output import pose_json, print_json, print_table, progress
-from app.cli.writing import checked_suffix, described, new_project, write_trajectory
+from app.cli.writing import checked_suffix, described, listed, new_project, write_trajectory
 from segmap.errors import ProjectError
 from segmap.events import IntegrationId
 from segmap.export import write_map
@@ -146,7 +146,7 @@ def _report(merged: _Merged, as_json: bool) -> None:
     typer.echo(f"{merged.title}: {accepted} of {total} integrations accepted, {count} components")
     print_table(("component", "scans", "range", "segments", "length [m]"), list(map(_row, merged.components)))
     if merged.alone:
-        typer.echo(f"not in the map, as no integration of theirs was accepted: {', '.join(map(str, merged.alone))}")
+        typer.echo(f"not in the map, as no integration of theirs was accepted: {listed(merged.alone)}")
     typer.echo(f"map {merged.hash}")
 
 
