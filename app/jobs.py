@@ -73,10 +73,15 @@ class Backlog(Generic[Task]):
         self._waiting: OrderedDict[Task, None] = OrderedDict()
         self._running: dict[Task, _Run] = {}
         self._cancelled = False
+        self._preparing = workers if prepare is not None else 0
         self._closed = threading.Event()
         self._threads = [threading.Thread(target=self._run, name=f"{name}-{i}", daemon=True) for i in range(workers)]
-        for thread in self._threads:
-            thread.start()
+        self._started = False
+
+    @property
+    def preparing(self) -> bool:
+        """Whether no thread has begun, though there is something to do."""
+        return self._preparing == len(self._threads) and self._ready()
 
     @property
     def cancelled(self) -> bool:
@@ -99,6 +104,7 @@ class Backlog(Generic[Task]):
                 wanted.pop(task, None)
             self._urgent.clear()
             self._waiting = wanted
+            self._start()
             self._condition.notify_all()
 
     def ask(self, task: Task) -> None:
@@ -110,6 +116,7 @@ class Backlog(Generic[Task]):
             self._waiting.pop(task, None)
             self._urgent[task] = None
             self._urgent.move_to_end(task)
+            self._start()
             self._condition.notify()
 
     def cancel(self) -> None:
@@ -143,6 +150,13 @@ class Backlog(Generic[Task]):
             self._condition.notify_all()
         _join(self._threads)
 
+    def _start(self) -> None:
+        """Threads begin with the first task: by then, whoever made the backlog is ready for its calls."""
+        if not self._started:
+            self._started = True
+            for thread in self._threads:
+                thread.start()
+
     def _ready(self) -> bool:
         return bool(self._urgent) or (bool(self._waiting) and not self._cancelled)
 
@@ -153,12 +167,18 @@ class Backlog(Generic[Task]):
 
     def _run(self) -> None:
         try:
-            if self._prepare is not None:
-                self._prepare(checker(self._closed))
+            self._get_ready()
         except CancelledError:
             return
         while (taken := self._take()) is not None:
             self._do(*taken)
+
+    def _get_ready(self) -> None:
+        if self._prepare is not None:
+            self._prepare(checker(self._closed))
+            with self._condition:
+                self._preparing -= 1
+            self._changed()
 
     def _take(self) -> tuple[Task, _Run] | None:
         with self._condition:
@@ -290,5 +310,5 @@ class WarmUp:
 
 def _join(threads: list[threading.Thread]) -> None:
     for thread in threads:
-        if thread is not threading.current_thread():
+        if thread.is_alive() and thread is not threading.current_thread():
             thread.join(JOIN_SECONDS)

@@ -23,6 +23,7 @@ from segmap.parameters import Parameters
 __all__ = ["Matching", "Progress", "Settings", "Task"]
 
 MATCHES_IN_MEMORY = 256
+PREPARING = "Getting ready; the first time this takes some seconds."
 IRRELEVANT = frozenset({"value_threshold", "fusion_tolerance", "fusion_variant", "fusion_bound", "pivot_form"})
 """parameters no candidate's value depends on"""
 OWN = {
@@ -118,13 +119,9 @@ class Matching:
     @property
     def progress(self) -> Progress:
         """How far matching by the heuristic in use is."""
-        done, total, running, cancelled = (
-            self._done,
-            len(self._integrations),
-            self._backlog.running,
-            self._backlog.cancelled,
-        )
-        return Progress(done, total, running, cancelled, _message(done, total, running, cancelled))
+        done, total, backlog = self._done, len(self._integrations), self._backlog
+        message = PREPARING if backlog.preparing else _message(done, total, backlog.running, backlog.cancelled)
+        return Progress(done, total, backlog.running, backlog.cancelled, message)
 
     def use(self, settings: Settings, heuristic: str) -> None:
         """Find all matches by a heuristic under these settings; what was found under others is no longer shown."""

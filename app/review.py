@@ -9,9 +9,10 @@ from typing import Any
 
 from segmap.events import Decision, IntegrationId
 from segmap.integration import Match
+from segmap.project import ProjectState
 from segmap.scans import ScanId
 
-__all__ = ["Flips", "Outcome", "Row", "counts", "flips", "queue", "row"]
+__all__ = ["Flips", "Outcome", "Row", "Rows", "counts", "flips", "queue", "row"]
 
 STATES = ("pending", "failed", "none", "matching", "accepted", "rejected")
 """In queue order: what a person can decide, what a person should know, what is not ready, what is done."""
@@ -71,12 +72,31 @@ class Flips:
     would_fail: tuple[str, ...]
 
 
-def row(integration: str, heuristic: str, outcome: Outcome | None, decision: Decision | None, threshold: float) -> Row:
+def row(blank: Row, heuristic: str, outcome: Outcome | None, decision: Decision | None, threshold: float) -> Row:
     """The row of an integration: its decision if there is one, on the evidence there is."""
-    found = _undecided(
-        Row(integration, *IntegrationId.parse(integration), "matching", heuristic=heuristic), outcome, threshold
-    )
+    found = _undecided(replace(blank, heuristic=heuristic), outcome, threshold)
     return found if decision is None else _decided(found, decision, threshold)
+
+
+class Rows:
+    """The rows of some integrations, each made again only when what it shows has changed."""
+
+    def __init__(self, integrations: Iterable[str]) -> None:
+        self._blank = {id: Row(id, *IntegrationId.parse(id), "matching") for id in integrations}
+        self._made: dict[str, tuple[Outcome | None, Decision | None, str, float, Row]] = {}
+
+    def __contains__(self, integration: str) -> bool:
+        return integration in self._blank
+
+    def row(self, integration: str, state: ProjectState, outcome: Outcome | None) -> Row:
+        """The row of an integration in a state of the project."""
+        decision, threshold = state.decisions.get(integration), state.parameters.value_threshold
+        held = self._made.get(integration)
+        if held and held[0] is outcome and held[1] is decision and held[2:4] == (state.heuristic, threshold):
+            return held[4]
+        made = row(self._blank[integration], state.heuristic, outcome, decision, threshold)
+        self._made[integration] = outcome, decision, state.heuristic, threshold, made
+        return made
 
 
 def _undecided(blank: Row, outcome: Outcome | None, threshold: float) -> Row:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import socket
 import sys
 import threading
@@ -130,6 +131,7 @@ class _Server(uvicorn.Server):
         """Serve; Ctrl+C ends it."""
         with suppress(KeyboardInterrupt):
             self.run(sockets=[self._listening])
+        gc.freeze()  # the interpreter's last collections would take seconds, and free what goes anyway
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)

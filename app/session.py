@@ -16,7 +16,7 @@ from app.jobs import Check, WarmUp
 from app.listeners import Listener, Listeners
 from app.matching import Matching, Progress, Settings
 from app.merged import Merged, MergedMap, map_parameters
-from app.review import Flips, Outcome, Row, counts, flips, queue, row
+from app.review import Flips, Outcome, Row, Rows, counts, flips, queue
 from segmap.candidates import HEURISTICS
 from segmap.errors import ParameterError, SegmapError
 from segmap.events import Choice, Clear, Decide, Event, IntegrationId, Redo, SetHeuristic, SetParameters, Undo
@@ -24,7 +24,7 @@ from segmap.export import thumbnail
 from segmap.integration import Match, match_maps
 from segmap.merging import Component
 from segmap.parameters import preset
-from segmap.project import ProjectState, accepted
+from segmap.project import ProjectState
 from segmap.scans import LaserLog, LaserScan, ScanId
 from segmap.segments import SegmentMap
 from segmap.store import Store
@@ -66,8 +66,8 @@ class Session:
         self._state = store.state
         self._inputs = Inputs(store, self._state.logs, store.log_bytes, known_logs)
         self._integrations = tuple(_consecutive(self._inputs.scan_ids))
-        self._known = frozenset(self._integrations)
-        self._version, self._rows = 0, (-1, tuple[Row, ...]())
+        self._rows = Rows(self._integrations)
+        self._version, self._queue = 0, (-1, tuple[Row, ...]())
         self._matching = Matching(
             store,
             self._integrations,
@@ -84,7 +84,8 @@ class Session:
             failed=lambda why: self._tell({"type": "error", "message": why}),
             prepare=self._prepare,
         )
-        self._follow(self._state)
+        start = ProjectState(parameters=self._state.parameters)
+        self._follow(Change(self._state, _changed(start, self._state)), start)
 
     # --- what there is ----------------------------------------------------------------------------
 
@@ -153,19 +154,17 @@ class Session:
     def row(self, integration: str) -> Row:
         """An integration as the queue shows it."""
         state = self._state
-        outcome = self._matching.outcome(self._checked(integration), state.heuristic)
-        decision = state.decisions.get(integration)
-        return row(integration, state.heuristic, outcome, decision, state.parameters.value_threshold)
+        return self._rows.row(self._checked(integration), state, self._matching.outcome(integration, state.heuristic))
 
     def rows(self) -> list[Row]:
         """The review queue, the integration that most needs a person first."""
         with self._lock:
-            version, held = self._rows
+            version, held = self._queue
             if version != self._version:
                 threshold = self._state.parameters.value_threshold
                 version = self._version
                 held = tuple(queue((self.row(name) for name in self._integrations), threshold))
-                self._rows = (version, held)
+                self._queue = (version, held)
             return list(held)
 
     def counts(self) -> Mapping[str, int]:
@@ -293,7 +292,7 @@ class Session:
     # --- within -----------------------------------------------------------------------------------
 
     def _checked(self, integration: str) -> str:
-        if integration not in self._known:
+        if integration not in self._rows:
             raise UnknownError(f"This project has no integration {integration[:80]!r}.")
         return integration
 
@@ -315,21 +314,23 @@ class Session:
             self._state = self._store.state
             change = Change(self._state, _changed(before, self._state))
             self._version += 1
-            self._follow(self._state, before)
+            self._follow(change, before)
         self._tell_change(before, change)
         return change
 
-    def _follow(self, state: ProjectState, before: ProjectState | None = None) -> None:
+    def _follow(self, change: Change, before: ProjectState) -> None:
         """Let the matches and the merged map be those of a state."""
+        state = change.state
         self._matching.use(Settings(state.parameters, state.mode), state.heuristic)
-        if _map_of(state) != (_map_of(before) if before else ((), map_parameters(state.parameters))):
+        placed = any(_accepted(s, name) for s in (before, state) for name in change.integrations)
+        if placed or map_parameters(before.parameters) != map_parameters(state.parameters):
             self._map.ask()
 
     def _tell_change(self, before: ProjectState, change: Change) -> None:
         state = change.state
         told = {"revision": state.revision, "undo": state.can_undo, "redo": state.can_redo}
         if change.integrations:
-            rows = [self.row(name).to_json() for name in change.integrations if name in self._known]
+            rows = [self.row(name).to_json() for name in change.integrations if name in self._rows]
             self._tell({"type": "decision", **told, "integrations": change.integrations, "rows": rows[:ROWS_TOLD]})
         if _settings_of(before) != _settings_of(state):
             parameters = state.parameters.model_dump(mode="json")
@@ -367,9 +368,9 @@ def _consecutive(scan_ids: Sequence[ScanId]) -> Iterator[str]:
     return (str(IntegrationId(a, b)) for a, b in pairwise(scan_ids) if a.log == b.log)
 
 
-def _map_of(state: ProjectState) -> tuple[object, ...]:
-    """What the merged map depends on."""
-    return accepted(state), map_parameters(state.parameters)
+def _accepted(state: ProjectState, integration: str) -> bool:
+    decision = state.decisions.get(integration)
+    return decision is not None and decision.verdict == "accepted"
 
 
 def _settings_of(state: ProjectState) -> tuple[object, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from app.review import Outcome, Row, counts, flips, queue, row
 from segmap.events import Decision
 from segmap.pose import Pose2
+from segmap.scans import ScanId
 
 THRESHOLD = 4.0
 
@@ -18,7 +19,13 @@ def made(scan: int, value: float | None = None, *, verdict: str = "", failure: s
         decision = Decision(
             integration=id, verdict=verdict, parameters="p", T_1_2=Pose2(1, 2, 0.5), value=5.0, who="Ada"
         )  # type: ignore[arg-type]
-    return row(id, "all", outcome if known else None, decision, THRESHOLD)
+    return row(
+        Row(id, ScanId(0, scan), ScanId(0, scan + 1), "matching"),
+        "all",
+        outcome if known else None,
+        decision,
+        THRESHOLD,
+    )
 
 
 def test_what_most_needs_a_person_comes_first() -> None:
