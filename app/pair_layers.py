@@ -60,11 +60,12 @@ def returns(content: Content) -> Iterator[Drawable]:
     if content.pair is None:
         return
     palette = content.palette
-    strength = 1.0 if content.stage == "scans" else 0.5
+    alone = content.stage == "scans"
     for frame, held, colour in zip(FRAMES, content.pair.returns, (palette.first, palette.second), strict=True):
         if len(held):
-            faint = palette.faint(colour, strength)
-            yield Drawable("returns", "returns", "points", points(held), faint, frame, depth=2, thickness=3.0)
+            shade = colour if alone else palette.faint(colour, 0.45)
+            thickness = 3.0 if alone else 2.5
+            yield Drawable("returns", "returns", "points", points(held), shade, frame, depth=2, thickness=thickness)
 
 
 def sensors(content: Content) -> Iterator[Drawable]:

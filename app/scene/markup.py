@@ -33,8 +33,8 @@ ROOM = 1.6
 
 
 def step(snapshot: Snapshot) -> str:
-    """Which pair this is, what its state is, and how many wait."""
-    row, queue = snapshot["row"], snapshot["queue"]
+    """Which pair this is, and what its state is."""
+    row = snapshot["row"]
     if row is None:
         return _block("<b>No pair</b>")
     names = " → ".join(_text(name) for name in snapshot["names"] or (row["first"], row["second"]))
@@ -45,9 +45,7 @@ def step(snapshot: Snapshot) -> str:
         f'<span style="border:1px solid {colour};color:{colour};border-radius:9px;padding:0 8px;'
         f'font-size:0.85em;font-weight:600;white-space:nowrap">{_text(word)}{who}</span>'
     )
-    waiting = f'<div style="{FAINT}">{_count(queue["pending"], "pair")} of {queue["total"]} to decide</div>'
-    head = f'<div style="display:flex;flex-wrap:wrap;gap:4px 8px;align-items:center"><b>{names}</b>{badge}</div>'
-    return _block(head + waiting)
+    return _block(f'<div style="display:flex;flex-wrap:wrap;gap:4px 8px;align-items:center"><b>{names}</b>{badge}</div>')
 
 
 def value(snapshot: Snapshot) -> str:
