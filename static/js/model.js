@@ -110,8 +110,10 @@ export class Project extends EventTarget {
     this.tell("match", event);
   }
 
-  #decided(event) {
-    this.#put(event.rows ?? []);
+  #decided({ rows = [], revision, undo, redo }) {
+    Object.assign(this.info, { revision, undo, redo });
+    this.tell("info");
+    this.#put(rows);
     this.redraw(0);
     this.refresh();
   }

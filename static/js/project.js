@@ -55,11 +55,12 @@ async function connect() {
 /** Open the view; where that fails, the queue is there nevertheless. */
 async function look(stream, integration) {
   try {
-    await view.open(integration);
-    if (project.rows.length === 0) cover("There is nothing to show: this project has no pair of scans.");
+    if (project.rows.length) return await view.open(integration);
+    cover("There is nothing to show: this project has no pair of scans.");
+    return listenTo(stream);
   } catch (error) {
     listenTo(stream);
-    cover(`The scene cannot be opened. ${error.message}`, () => look(stream, integration));
+    return cover(`The scene cannot be opened. ${error.message}`, () => look(stream, integration));
   }
 }
 
@@ -103,9 +104,8 @@ function keyboard() {
   byId("help-open").addEventListener("click", help);
   const act = (action) => () => view.act(action).catch(failed);
   const actions = { next: () => queue.turn(1), previous: () => queue.turn(-1), search, help };
-  for (const name of ["undo", "redo"]) actions[name] = () => byId(name).disabled || byId(name).click();
   for (const name of ["accept", "reject"]) actions[name] = () => view.act(name, view.integration).catch(failed);
-  for (const name of ["skip", "toggle_dimension", "fit"]) actions[name] = act(name);
+  for (const name of ["skip", "undo", "redo", "toggle_dimension", "fit"]) actions[name] = act(name);
   actions.stage = (number) => view.act("set_stage", view.snapshot.stages[number - 1]).catch(failed);
   for (const what of ["candidate", "heuristic", "stage"]) {
     for (const way of ["next", "previous"]) actions[`${way}_${what}`] = act(`${way}_${what}`);

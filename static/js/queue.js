@@ -30,6 +30,7 @@ export class Queue {
   #flips = { passes: new Set(), fails: new Set() };
   #shown = [];
   #scale = 1;
+  #threshold = 0;
 
   constructor(project, view, enter) {
     Object.assign(this, { project, view, enter });
@@ -37,6 +38,7 @@ export class Queue {
     this.list = new VirtualList(this.box, { height: HEIGHT, make: makeRow, draw: (element, row) => this.#draw(element, row), key: (row) => row.id });
     this.#controls();
     project.addEventListener("rows", () => this.refresh());
+    project.addEventListener("info", () => project.info.threshold === this.#threshold || this.refresh());
     view.addEventListener("changed", () => this.#follow());
   }
 
@@ -49,7 +51,8 @@ export class Queue {
   refresh() {
     const test = FILTERS.find(([name]) => name === this.#filter)[2];
     this.#shown = this.project.rows.filter((row) => test(row) && found(row, this.#search));
-    this.#scale = scale(this.project.rows, this.project.info?.threshold ?? 0);
+    this.#threshold = this.project.info?.threshold ?? 0;
+    this.#scale = scale(this.project.rows, this.#threshold);
     this.list.show(this.#shown, this.view.integration);
     this.#chips();
     this.#empty();
@@ -153,7 +156,7 @@ export class Queue {
     setIcon(state.firstElementChild, stateIcon(row.state));
     text(state.lastElementChild, stateLabel(row.state));
     text(id, pair(row.id));
-    drawBar(bar, row, this.#scale, this.project.info?.threshold ?? 0);
+    drawBar(bar, row, this.#scale, this.#threshold);
     text(value, row.value === null || row.value === undefined ? "" : metres(row.value));
     this.#note(note, row);
     set(element, "aria-selected", String(row.id === this.view.integration));

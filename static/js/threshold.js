@@ -34,7 +34,7 @@ export class Threshold {
     const { threshold } = this.project.info;
     this.slider.max = Math.max(2 * threshold, Number(this.slider.max));
     this.slider.value = threshold;
-    this.exact.value = threshold.toFixed(2);
+    if (document.activeElement !== this.exact) this.exact.value = threshold.toFixed(2);
     this.#draw();
   }
 

@@ -1,0 +1,236 @@
+"""A real browser on a real server: what the tests that drive the page share."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import httpx
+import pytest
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Frame, Locator, Page
+
+ROOT = Path(__file__).resolve().parents[2]
+CHROMIUM = "/usr/bin/chromium"
+ARGUMENTS = (
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+)
+SERVE = "import sys; from pathlib import Path; from app.server import serve; serve(port=0, workspace=Path(sys.argv[1]))"
+STARTED = re.compile(r"segmap is at (http://\S+?)/ ")
+STOP_SECONDS = 20.0
+MATCHING_SECONDS = 90.0
+PATIENCE = 20_000.0
+"""milliseconds; a loaded machine draws slowly"""
+DRAWN = "() => window.__viserMutable?.camera && '/second' in (window.__viserMutable.nodeRefFromName ?? {})"
+NODES = """() => {
+  const nodes = {};
+  for (const [name, node] of Object.entries(window.__viserMutable.nodeRefFromName)) {
+    const colours = new Set();
+    node?.traverse?.((part) => part.material?.color && colours.add(part.material.color.getHexString()));
+    nodes[name] = { at: node?.position?.toArray() ?? null, shown: node?.visible ?? null, colours: [...colours] };
+  }
+  return nodes;
+}"""
+CAMERA = """() => {
+  const camera = window.__viserMutable.camera;
+  const ahead = camera.getWorldDirection(camera.position.clone());
+  return { fov: camera.fov, ahead: ahead.toArray(), distance: camera.position.length() };
+}"""
+
+
+class Server:
+    """`segmap serve` in a process of its own, on a folder of projects; it can be stopped and started again."""
+
+    def __init__(self, workspace: Path) -> None:
+        self.workspace = workspace
+        self.start()
+
+    def start(self) -> None:
+        """Start, and wait until it answers."""
+        command = [sys.executable, "-c", SERVE, str(self.workspace)]
+        self._process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+        assert self._process.stderr is not None
+        seen = ""
+        for line in self._process.stderr:
+            seen += line
+            if found := STARTED.search(line):
+                self.url = found[1]
+                return
+        pytest.fail(f"the server did not start:\n{seen}")
+
+    def stop(self) -> None:
+        """End it as Ctrl+C does."""
+        self._end(signal.SIGINT)
+
+    def kill(self) -> None:
+        """End it as a power cut does."""
+        self._end(signal.SIGKILL)
+
+    def _end(self, how: signal.Signals) -> None:
+        self._process.send_signal(how)
+        self._process.communicate(timeout=STOP_SECONDS)
+
+    def get(self, path: str) -> Any:
+        """What the API answers."""
+        return httpx.get(self.url + path, timeout=60.0).raise_for_status().json()
+
+    def wait_until_matched(self, project: str) -> None:
+        """Back when every pair of a project is matched."""
+        end = time.monotonic() + MATCHING_SECONDS
+        while (progress := self.get(f"/api{project}")["progress"])["done"] < progress["total"]:
+            if time.monotonic() > end:
+                pytest.fail(f"matching takes too long: {progress}")
+            time.sleep(0.1)
+
+    def open_sample(self, name: str) -> str:
+        """The path of the page of a new project made of a sample."""
+        answer = httpx.post(f"{self.url}/api/projects", json={"sample": name}, timeout=60.0)
+        return str(answer.raise_for_status().json()["url"])
+
+
+class Desk:
+    """A page as a person uses it: what is on it, and what the scene in it shows."""
+
+    def __init__(self, page: Page, pictures: Path) -> None:
+        self.page = page
+        self._pictures = pictures
+        self.errors: list[str] = []
+        page.set_default_timeout(PATIENCE)
+        page.on("console", lambda message: message.type == "error" and self.errors.append(message.text))
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+
+    def open(self, url: str) -> None:
+        """Go to a project's page; back when its queue and its scene are there."""
+        self.page.goto(url)
+        self.page.locator(".item").first.wait_for()
+        self.wait_for_scene()
+
+    def wait_for_scene(self) -> None:
+        """Back when the scene has drawn something."""
+        self.page.locator("#scene-cover").wait_for(state="hidden")
+        self.until(lambda: any("/scene" in frame.url for frame in self.page.frames), "the scene")
+        self.scene.wait_for_function(DRAWN)
+
+    @property
+    def scene(self) -> Frame:
+        """The document of the scene."""
+        return next(frame for frame in self.page.frames if "/scene" in frame.url)
+
+    @property
+    def nodes(self) -> dict[str, Any]:
+        """Everything the scene draws by name: where it is, whether it is shown, in which colours."""
+        return dict(self.scene.evaluate(NODES))
+
+    @property
+    def camera(self) -> dict[str, Any]:
+        """The scene's camera: field of view in degrees, where it looks, how far it is from the origin."""
+        return dict(self.scene.evaluate(CAMERA))
+
+    @property
+    def selected(self) -> str:
+        """The id of the integration selected in the queue."""
+        return str(self.page.locator(".item[aria-selected=true]").get_attribute("data-id"))
+
+    @property
+    def candidate(self) -> int:
+        """The rank of the candidate marked in the table, from 0."""
+        return int(self.page.locator("#candidates-body tr[aria-selected=true]").get_attribute("data-rank") or -1)
+
+    def count(self, state: str) -> int:
+        """The number on a filter of the queue."""
+        return int(self.page.locator(f"[data-filter={state}] .number").inner_text().replace(",", ""))
+
+    def row(self, integration: str) -> Locator:
+        """The row of an integration."""
+        return self.page.locator(f'.item[data-id="{integration}"]:not([hidden])')
+
+    def until(self, true: Callable[[], bool], what: str) -> None:
+        """Wait until something becomes true."""
+        end = time.monotonic() + PATIENCE / 1000.0
+        while time.monotonic() < end:
+            if true():
+                return
+            self.page.wait_for_timeout(25)
+        pytest.fail(f"still waiting for: {what}; {self.picture('failed')} shows the page")
+
+    def picture(self, name: str) -> Path:
+        """Keep what the page looks like now."""
+        path = self._pictures / f"{name}.png"
+        self.page.screenshot(path=path)
+        return path
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Browser]:
+    """Chromium; skips where there is none."""
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install playwright")
+    path = Path(os.environ.get("SEGMAP_CHROMIUM", CHROMIUM))
+    if not path.is_file():
+        pytest.skip(f"there is no chromium at {path}; set SEGMAP_CHROMIUM to where it is")
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(path), args=list(ARGUMENTS))
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="session")
+def start_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[], Server]]:
+    """Start a server on an empty folder of projects."""
+    started: list[Server] = []
+
+    def start() -> Server:
+        started.append(Server(tmp_path_factory.mktemp("projects")))
+        return started[-1]
+
+    yield start
+    for server in started:
+        server.kill()
+
+
+@pytest.fixture(scope="session")
+def server(chromium: Browser, start_server: Callable[[], Server]) -> Server:
+    """The server all tests share; every test opens projects of its own."""
+    return start_server()
+
+
+@pytest.fixture
+def pictures(tmp_path: Path) -> Path:
+    """Where screenshots go: SEGMAP_SCREENSHOTS, or a temporary folder."""
+    folder = Path(os.environ.get("SEGMAP_SCREENSHOTS", tmp_path))
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+@pytest.fixture
+def new_desk(chromium: Browser, pictures: Path) -> Iterator[Callable[..., Desk]]:
+    """Open a page in a window of its own; at the end, nothing may have complained in it."""
+    desks: list[Desk] = []
+
+    def open_desk(width: int = 1280, height: int = 800, scheme: str = "light") -> Desk:
+        size: Any = {"width": width, "height": height}
+        context = chromium.new_context(viewport=size, color_scheme=scheme, accept_downloads=True)  # type: ignore[arg-type]
+        desks.append(Desk(context.new_page(), pictures))
+        return desks[-1]
+
+    yield open_desk
+    for desk in desks:
+        desk.page.context.close()
+    assert [error for desk in desks for error in desk.errors] == []
+
+
+@pytest.fixture
+def desk(new_desk: Callable[..., Desk]) -> Desk:
+    """A page of the usual size."""
+    return new_desk()

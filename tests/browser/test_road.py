@@ -1,0 +1,150 @@
+"""The whole road in a browser: from a log to an exported map, with the server stopped in between."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+pytestmark = pytest.mark.browser
+
+FIRST, SECOND = "0067be", "e06000"
+"""colours of the two maps on a light background"""
+
+
+def candidates(server: Any, project: str, integration: str) -> list[Any]:
+    """The ranked candidates as the API has them."""
+    return list(server.get(f"/api{project}/integrations/{integration}")["match"]["ranked"])
+
+
+def test_a_sample_becomes_a_map(new_desk: Callable[..., Any], start_server: Callable[[], Any]) -> None:
+    """Step candidates and heuristics, accept, reject, undo, export; stop, start again: every decision is there."""
+    server, desk = start_server(), new_desk(1440, 900)
+    project = server.open_sample("office")
+    desk.open(server.url + project)
+    see_both_maps(desk)
+    step_candidates(desk, server, project)
+    step_heuristics(desk)
+    decide(desk)
+    export(desk)
+    decided = states(server, project)
+    server.stop()
+    desk.page.locator("#offline").wait_for()
+    server.start()
+    again = new_desk()
+    again.open(server.url + project)
+    assert states(server, project) == decided
+    assert again.count("accepted") == list(decided.values()).count("accepted")
+    again.page.locator("#undo").click()
+    again.until(lambda: states(server, project) != decided, "undo after a restart")
+    desk.errors.clear()
+
+
+def see_both_maps(desk: Any) -> None:
+    """Both maps are drawn in their colours, seen straight from above through a field of view of one degree."""
+    nodes = desk.nodes
+    assert FIRST in nodes["/first/sensor"]["colours"]
+    assert SECOND in nodes["/second/sensor"]["colours"]
+    desk.until(lambda: any(name.startswith("/first/chains/") for name in desk.nodes), "the matching chains")
+    assert desk.camera["fov"] == pytest.approx(1.0)
+    assert desk.camera["ahead"] == pytest.approx([0.0, -1.0, 0.0], abs=1e-2)
+
+
+def step_candidates(desk: Any, server: Any, project: str) -> None:
+    """Keys in the page, a click in the table and keys in the scene move the second map to the candidate."""
+    ranked = candidates(server, project, desk.selected)
+    for act, rank in (
+        (lambda: desk.page.keyboard.press("n"), 1),
+        (lambda: desk.page.locator("#candidates-body tr").nth(4).click(), 4),
+        (lambda: desk.page.keyboard.press("p"), 3),
+        (lambda: (desk.page.mouse.click(620, 700), desk.page.keyboard.press("n")), 4),
+    ):
+        act()
+        desk.until(lambda rank=rank: desk.candidate == rank, f"candidate {rank} in the table")
+        pose = ranked[rank]["T_1_2"]
+        desk.until(
+            lambda pose=pose: desk.nodes["/second"]["at"][:2] == pytest.approx([pose["x"], pose["y"]], abs=1e-3),
+            "the pose",
+        )
+
+
+def step_heuristics(desk: Any) -> None:
+    """Next and previous heuristic: each is tried on the pair, and told with what it tried and found."""
+    desk.page.locator("#tab-heuristics").click()
+    for heuristic in ("consecutive", "random", "histogram"):
+        desk.page.locator("#heuristic-next").click()
+        line = desk.page.locator(f"#panel-heuristics tr[data-heuristic={heuristic}][aria-selected=true]")
+        desk.until(lambda line=line: line.locator("td").count() == 3, f"the result of {heuristic}")
+    desk.picture("heuristics")
+    for _ in range(3):
+        desk.page.keyboard.press("Shift+H")
+    desk.page.locator("tr[data-heuristic=all][aria-selected=true]").wait_for()
+    desk.page.locator("#tab-candidates").click()
+
+
+def decide(desk: Any) -> None:
+    """Accept and reject go on to the next pair; undo and redo say what they do, and come back to the pair."""
+    accepted = desk.selected
+    desk.page.keyboard.press("y")
+    desk.until(lambda: desk.count("accepted") == 1 and desk.selected != accepted, "the accepted pair")
+    rejected = desk.selected
+    desk.page.wait_for_timeout(400)
+    desk.page.keyboard.press("x")
+    desk.until(lambda: desk.count("rejected") == 1 and desk.selected != rejected, "the rejected pair")
+    assert rejected in (desk.page.locator("#undo").get_attribute("title") or "")
+    desk.page.keyboard.press("u")
+    desk.until(lambda: desk.count("rejected") == 0 and desk.selected == rejected, "the undo")
+    desk.page.keyboard.press("r")
+    desk.until(lambda: desk.count("rejected") == 1, "the redo")
+    desk.page.locator("#accept-above").click()
+    desk.until(lambda: desk.count("accepted") > 20, "the bulk decision")
+
+
+def export(desk: Any) -> None:
+    """The merged map is drawn, counted, and saved as a file that holds it."""
+    desk.page.locator("#tab-map").click()
+    desk.page.locator("#components h3").first.wait_for()
+    desk.page.keyboard.press("6")
+    desk.until(lambda: any(name.startswith("/map/") for name in desk.nodes), "the merged map in the scene")
+    desk.picture("map")
+    desk.page.locator("#export summary").click()
+    with desk.page.expect_download() as saving:
+        desk.page.get_by_text("Merged map, GeoJSON").click()
+    assert saving.value.suggested_filename.endswith(".geojson")
+    saved = json.loads(Path(saving.value.path()).read_text(encoding="utf-8"))
+    assert saved["type"] == "FeatureCollection"
+    assert len(saved["features"]) > 20
+
+
+def states(server: Any, project: str) -> dict[str, str]:
+    """The decisions by integration."""
+    rows = server.get(f"/api{project}/integrations")["integrations"]
+    return {row["id"]: row["state"] for row in rows if row["state"] in ("accepted", "rejected")}
+
+
+def test_a_real_log_while_it_is_matched(new_desk: Callable[..., Any], server: Any, datasets: Path) -> None:
+    """The first pair is on the screen while the rest is matched; matching can be stopped and goes on."""
+    log = datasets / "intel" / "intel-corrected.log.gz"
+    with log.open("rb") as file:
+        answer = httpx.post(f"{server.url}/api/projects", files={"files": (log.name, file)}, timeout=60.0)
+    project = answer.raise_for_status().json()["url"]
+    desk = new_desk(1440, 900)
+    desk.open(server.url + project)
+    assert desk.page.locator("#matching").is_visible()
+    desk.until(lambda: any(name.startswith("/first/chains/") for name in desk.nodes), "the first pair")
+    desk.page.get_by_role("button", name="Cancel").click()
+    desk.page.get_by_role("button", name="Resume").wait_for()
+    progress = server.get(f"/api{project}")["progress"]
+    assert 0 < progress["done"] < progress["total"]
+    chosen = desk.selected
+    desk.page.keyboard.press("y")
+    desk.until(lambda: desk.row(chosen).count() == 0 or desk.count("accepted") == 1, "the decision")
+    desk.page.get_by_role("button", name="Resume").click()
+    desk.page.get_by_role("button", name="Cancel").wait_for()
+    desk.picture("real-log")
+    desk.page.get_by_role("button", name="Cancel").click()
+    desk.page.get_by_role("button", name="Resume").wait_for()
