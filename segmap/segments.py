@@ -155,7 +155,7 @@ def extract(scan: LaserScan, parameters: Parameters, log: int = 0, index: int = 
     written into the sources. A scan without returns gives the empty map.
 
     >>> len(extract(LaserScan(np.full(180, 2.0), -1.57, 0.0175), Parameters()))
-    12
+    16
     """
     points, _ = scan.returns(parameters.max_range)
     points = points if scan.angle_step > 0.0 else points[::-1]  # the sensor is on the left either way
@@ -194,7 +194,8 @@ def approximate(chunks: list[FloatArray], split_tolerance: float) -> FloatArray:
         return np.empty((0, 4))
     owners = np.repeat(np.arange(len(long_enough)), [len(chunk) for chunk in long_enough])
     lines = shapely.linestrings(np.concatenate(long_enough), indices=owners)
-    simple = shapely.simplify(lines, split_tolerance, preserve_topology=False)
+    with np.errstate(invalid="ignore"):  # points nearer to each other than floats can square
+        simple = shapely.simplify(lines, split_tolerance, preserve_topology=False)
     corners, line = shapely.get_coordinates(simple, return_index=True)
     same_line = line[1:] == line[:-1]
     return np.concatenate((corners[:-1], corners[1:]), axis=1)[same_line]
