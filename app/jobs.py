@@ -24,7 +24,8 @@ __all__ = ["Backlog", "Check", "Latest", "WarmUp"]
 Check = Callable[[], None]
 Task = TypeVar("Task", bound=Hashable)
 
-JOIN_SECONDS = 10.0
+JOIN_SECONDS = 3.0
+"""how long closing waits for work that does not look at its check"""
 WARM_UP_SCRIPT = Path(__file__).with_name("warm_up.py")
 log = logging.getLogger(__name__)
 

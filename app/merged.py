@@ -29,6 +29,8 @@ class Merged:
     components: tuple[Component, ...] = ()
     hash: str = ""
     parameters: Parameters | None = None
+    integrations: tuple[str, ...] = ()
+    """the accepted ones it was made of"""
 
 
 def map_parameters(parameters: Parameters) -> Parameters:
@@ -52,7 +54,8 @@ def merge_project(
         maps[scan] = extractor(scan, state.parameters)
     reusable = previous.components if previous and previous.parameters == parameters else ()
     components = merge_accepted(maps, edges, state.parameters, previous=reusable, check=check)
-    return Merged(state.revision, components, map_hash(components), parameters)
+    integrations = tuple(str(IntegrationId(first, second)) for first, second, _ in edges)
+    return Merged(state.revision, components, map_hash(components), parameters, integrations)
 
 
 def export_project(state: ProjectState, merged: Merged, format: str) -> bytes:
@@ -70,8 +73,7 @@ def export_project(state: ProjectState, merged: Merged, format: str) -> bytes:
         "revision": str(merged.revision),
         "parameters": state.fingerprint,
     }
-    integrations = [str(IntegrationId(first, second)) for first, second, _ in accepted(state)]
-    return export_map(merged.components, format, told, integrations)
+    return export_map(merged.components, format, told, merged.integrations)
 
 
 class MergedMap:

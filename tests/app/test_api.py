@@ -327,6 +327,27 @@ def test_what_is_not_there_is_404(client: Any, project: str, url: str) -> None:
     failure(client.get(url.format(project=project)), 404)
 
 
+@pytest.mark.parametrize("method", ["GET", "HEAD", "OPTIONS", "POST", "PUT", "PATCH", "DELETE"])
+def test_odd_addresses_are_refused_in_peace(client: Any, project: str, method: str) -> None:
+    """Zero bytes, half characters, other methods, other hosts in the path: never a fault of ours."""
+    for url in (
+        "/static/%00",
+        "/static/" + "a" * 5000,
+        "/api/projects/%00",
+        "/projects/%ff%fe",
+        "/api/views/%00",
+        "/views/none/scene/..%2f..%2fetc/passwd",
+        "/api/samples/%00/picture.svg",
+        f"/api/projects/{project}/integrations/%00",
+        f"/api/projects/{project}/export/%00",
+        f"/api/projects/{project}/events?view=%00",
+        "//evil.example/",
+        "/projects/",
+        "/static",
+    ):
+        assert client.request(method, url).status_code < 500, url
+
+
 @pytest.mark.parametrize(
     ("path", "body"),
     [
