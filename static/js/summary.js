@@ -7,12 +7,24 @@ import { sentence } from "./problems.js";
 const LINES = 50;
 const EMPTY = "The map is empty: accept an integration, and its scans are merged.";
 
-/** Keep both lists up to date. */
+/** Keep both lists up to date; what has not changed is left as it is, with its details open or closed. */
 export function summary(project) {
+  const showMap = whenChanged(components);
+  const showLogs = whenChanged(logs);
   project.addEventListener("info", () => {
-    components(project.info);
-    logs(project.info);
+    const { components: parts, unplaced, merging, logs: files } = project.info;
+    showMap({ components: parts, unplaced, merging });
+    showLogs({ logs: files });
   });
+}
+
+function whenChanged(show) {
+  let shown = "";
+  return (facts) => {
+    const wanted = JSON.stringify(facts);
+    if (wanted !== shown) show(facts);
+    shown = wanted;
+  };
 }
 
 function components({ components: all, unplaced, merging }) {

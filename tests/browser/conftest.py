@@ -27,7 +27,7 @@ ARGUMENTS = (
     "--disable-background-networking",
     "--disable-component-update",
 )
-SERVE = "import sys; from pathlib import Path; from app.server import serve; serve(port=0, workspace=Path(sys.argv[1]))"
+SERVE = "import sys; from pathlib import Path; from app.server import serve; serve(port=int(sys.argv[1]), workspace=Path(sys.argv[2]))"
 STARTED = re.compile(r"segmap is at (http://\S+?)/ ")
 STOP_SECONDS = 20.0
 MATCHING_SECONDS = 90.0
@@ -55,11 +55,12 @@ class Server:
 
     def __init__(self, workspace: Path) -> None:
         self.workspace = workspace
+        self.url = "http://127.0.0.1:0"
         self.start()
 
     def start(self) -> None:
-        """Start, and wait until it answers."""
-        command = [sys.executable, "-c", SERVE, str(self.workspace)]
+        """Start, at the port it had before, and wait until it answers."""
+        command = [sys.executable, "-c", SERVE, self.url.rpartition(":")[2], str(self.workspace)]
         self._process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
         assert self._process.stderr is not None
         seen = ""
@@ -111,11 +112,13 @@ class Desk:
         page.on("console", lambda message: message.type == "error" and self.errors.append(message.text))
         page.on("pageerror", lambda error: self.errors.append(str(error)))
 
-    def open(self, url: str) -> None:
-        """Go to a project's page; back when its queue and its scene are there."""
+    def open(self, url: str, *, scene: bool = True) -> None:
+        """Go to a project's page; back when its queue is there, and its scene."""
         self.page.goto(url)
         self.page.locator(".item").first.wait_for()
-        self.wait_for_scene()
+        self.page.locator("#candidates-body tr[aria-selected=true]").wait_for()
+        if scene:
+            self.wait_for_scene()
 
     def wait_for_scene(self) -> None:
         """Back when the scene has drawn something."""
@@ -168,8 +171,17 @@ class Desk:
     def picture(self, name: str) -> Path:
         """Keep what the page looks like now."""
         path = self._pictures / f"{name}.png"
+        if any("/scene" in frame.url for frame in self.page.frames):
+            self._close_notes()
         self.page.screenshot(path=path)
         return path
+
+    def _close_notes(self) -> None:
+        """viser tells everybody who has no graphics card."""
+        note = self.scene.get_by_text("Software WebGL rendering detected")
+        if note.count():
+            self.scene.locator("button.mantine-Notification-closeButton").first.click()
+            note.wait_for(state="detached")
 
 
 @pytest.fixture(scope="session")
@@ -186,23 +198,11 @@ def chromium() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="session")
-def start_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[], Server]]:
-    """Start a server on an empty folder of projects."""
-    started: list[Server] = []
-
-    def start() -> Server:
-        started.append(Server(tmp_path_factory.mktemp("projects")))
-        return started[-1]
-
-    yield start
-    for server in started:
-        server.kill()
-
-
-@pytest.fixture(scope="session")
-def server(chromium: Browser, start_server: Callable[[], Server]) -> Server:
+def server(chromium: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """The server all tests share; every test opens projects of its own."""
-    return start_server()
+    server = Server(tmp_path_factory.mktemp("projects"))
+    yield server
+    server.kill()
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +24,13 @@ def named(name: str, text: str) -> dict[str, Any]:
     return {"name": name, "mimeType": "text/plain", "buffer": text.encode()}
 
 
-def test_first_visit(desk: Any, start_server: Callable[[], Any]) -> None:
+def test_first_visit(desk: Any, server: Any) -> None:
     """An empty workbench says how to start, and shows the samples with their pictures; one click opens one."""
-    desk.page.goto(start_server().url)
+    empty = '{"projects": []}'
+    desk.page.route(
+        re.compile("/api/projects$"), lambda r: r.fulfill(body=empty) if r.request.method == "GET" else r.continue_()
+    )
+    desk.page.goto(server.url)
     desk.page.get_by_text("None yet. Drop a log above, or open a sample.").wait_for()
     cards = desk.page.locator("#samples .card:not(.placeholder)")
     desk.until(lambda: cards.count() == 4, "the samples")

@@ -20,8 +20,8 @@ def project(server: Any) -> str:
 
 @pytest.fixture
 def desk(desk: Any, server: Any, project: str) -> Any:
-    """A page on that project."""
-    desk.open(server.url + project)
+    """A page on that project; its scene comes when it comes."""
+    desk.open(server.url + project, scene=False)
     return desk
 
 
@@ -103,6 +103,7 @@ def test_help(desk: Any) -> None:
     desk.page.keyboard.press("Escape")
     desk.page.locator("#help").wait_for(state="hidden")
     assert desk.count("accepted") == 0
+    desk.wait_for_scene()
     desk.page.mouse.click(600, 700)
     desk.page.keyboard.press("?")
     desk.page.locator("#help").wait_for()
@@ -111,7 +112,7 @@ def test_help(desk: Any) -> None:
 def test_two_people(desk: Any, new_desk: Callable[..., Any], server: Any, project: str) -> None:
     """A second browser sees a decision at once, and keeps its own selection."""
     other = new_desk()
-    other.open(server.url + project)
+    other.open(server.url + project, scene=False)
     other.page.keyboard.press("j")
     chosen = desk.selected
     desk.until(lambda: other.selected != chosen, "the other selection")

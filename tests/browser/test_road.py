@@ -21,9 +21,9 @@ def candidates(server: Any, project: str, integration: str) -> list[Any]:
     return list(server.get(f"/api{project}/integrations/{integration}")["match"]["ranked"])
 
 
-def test_a_sample_becomes_a_map(new_desk: Callable[..., Any], start_server: Callable[[], Any]) -> None:
+def test_a_sample_becomes_a_map(new_desk: Callable[..., Any], server: Any) -> None:
     """Step candidates and heuristics, accept, reject, undo, export; stop, start again: every decision is there."""
-    server, desk = start_server(), new_desk(1440, 900)
+    desk = new_desk(1440, 900)
     project = server.open_sample("office")
     desk.open(server.url + project)
     see_both_maps(desk)
@@ -35,13 +35,13 @@ def test_a_sample_becomes_a_map(new_desk: Callable[..., Any], start_server: Call
     server.stop()
     desk.page.locator("#offline").wait_for()
     server.start()
-    again = new_desk()
-    again.open(server.url + project)
     assert states(server, project) == decided
-    assert again.count("accepted") == list(decided.values()).count("accepted")
-    again.page.locator("#undo").click()
-    again.until(lambda: states(server, project) != decided, "undo after a restart")
+    desk.page.locator("#offline").wait_for(state="hidden")
+    desk.wait_for_scene()
     desk.errors.clear()
+    assert desk.count("accepted") == list(decided.values()).count("accepted")
+    desk.page.locator("#undo").click()
+    desk.until(lambda: desk.count("accepted") == 1, "the undo of a decision made before")
 
 
 def see_both_maps(desk: Any) -> None:
