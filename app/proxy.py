@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Coroutine
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import httpx
@@ -25,6 +25,9 @@ from websockets.typing import Subprotocol
 from app.errors import RequestError, UnknownError
 from app.routes.common import Site
 from app.security import own_origin
+
+if TYPE_CHECKING:
+    from app.scene import Scene
 
 __all__ = ["POLICY", "SCRIPT", "router"]
 
@@ -95,7 +98,7 @@ async def socket(site: Site, view: str, browser: WebSocket) -> None:
         return
     try:
         with site.views.watched(view) as opened:
-            await _bridge(browser, opened.scene.port)
+            await _bridge(browser, opened.scene)
     except UnknownError:
         await browser.close(1008)
 
@@ -120,12 +123,17 @@ def _with_script(html: bytes) -> bytes:
     return before + head + SCRIPT + after
 
 
-async def _bridge(browser: WebSocket, port: int) -> None:
+async def _bridge(browser: WebSocket, scene: Scene) -> None:
     """Pass messages both ways until either side goes."""
     offered = [Subprotocol(name) for name in browser.scope.get("subprotocols", ())]
     try:
         async with connect(
-            f"ws://{HOST}:{port}", subprotocols=offered or None, compression=None, max_size=None, proxy=None
+            f"ws://{HOST}:{scene.port}",
+            subprotocols=offered or None,
+            additional_headers=scene.headers,
+            compression=None,
+            max_size=None,
+            proxy=None,
         ) as viser:
             await browser.accept(viser.subprotocol)
             await _first_of(_outwards(browser, viser), _inwards(viser, browser))

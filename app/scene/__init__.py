@@ -16,7 +16,7 @@ from app.palette import PALETTES
 from app.scene.camera import Cameras, reach
 from app.scene.nodes import Nodes
 from app.scene.panel import Panel
-from app.scene.server import QuietServer
+from app.scene.server import PASS_HEADER, QuietServer
 from app.workbench import View
 from segmap.errors import SegmapError
 
@@ -51,9 +51,10 @@ class Scene:
         """Where it listens, on the loopback interface."""
         return self._server.get_port()
 
-    def opened(self, dark: bool) -> None:
-        """A page of a light or a dark browser is about to show it."""
-        self._view.set_theme("dark" if dark else "light")
+    @property
+    def headers(self) -> dict[str, str]:
+        """What a socket must bring to be let in."""
+        return {PASS_HEADER: self._server.secret}
 
     def close(self) -> None:
         """Stop serving; closing twice is harmless."""

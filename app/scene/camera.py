@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import threading
+from itertools import product
 from typing import TypeAlias
 
 import numpy as np
@@ -24,10 +25,14 @@ FIELD_OF_VIEW = {2: math.radians(1.0), 3: math.radians(45.0)}
 MARGIN = 1.12
 MOVED = 1e-3
 """of the distance: a camera farther from where it was put was moved by a person"""
-SLANT = np.array([-0.45, -0.75, 0.75])
-"""where a 3D camera stands, seen from what it looks at"""
-RAISED, ROOM = 0.18, 1.25
-"""in 3D: how high the camera looks, in widths, and how much farther away it stands, to see the space of poses too"""
+LEAST = 0.5
+"""metres from the middle to the edge of the window, at least"""
+TALL = 0.4
+"""in 3D: height to be seen, in widths, so that the space of poses is in sight too"""
+UP_2D, BACK_2D = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+UP_3D = np.array([0.0, 0.0, 1.0])
+BACK_3D = np.array([-0.45, -0.75, 0.75]) / np.linalg.norm([-0.45, -0.75, 0.75])
+"""from what is looked at to the camera"""
 PICK_PIXELS = 10.0
 
 
@@ -101,16 +106,23 @@ class Cameras:
 
 
 def stand(bounds: Box, dimension: int, aspect: float) -> tuple[Triple, Triple, Triple]:
-    """Position, point looked at and up direction of a camera that sees a box."""
+    """Position, point looked at and up direction of a camera that sees all of a box, in a window of that shape."""
     left, bottom, right, top = bounds
-    x, y = (left + right) / 2.0, (bottom + top) / 2.0
-    half = max(top - bottom, (right - left) / max(aspect, 1e-3), 1.0) / 2.0 * MARGIN
-    distance = half / math.tan(FIELD_OF_VIEW[dimension] / 2.0)
-    if dimension == 2:
-        return (x, y, distance), (x, y, 0.0), (0.0, 1.0, 0.0)
-    centre = np.array([x, y, RAISED * max(right - left, top - bottom)])
-    position = centre + ROOM * distance * SLANT / np.linalg.norm(SLANT)
-    return _triple(position), _triple(centre), (0.0, 0.0, 1.0)
+    height = TALL * max(right - left, top - bottom) if dimension == 3 else 0.0
+    corners = np.array(list(product((left, right), (bottom, top), (0.0, height))))
+    centre = np.array([(left + right) / 2.0, (bottom + top) / 2.0, height / 2.0])
+    up, back = (UP_2D, BACK_2D) if dimension == 2 else (UP_3D, BACK_3D)
+    position = centre + _distance(corners - centre, up, back, dimension, max(aspect, 1e-3)) * back
+    return _triple(position), _triple(centre), _triple(up)
+
+
+def _distance(corners: FloatArray, up: FloatArray, back: FloatArray, dimension: int, aspect: float) -> float:
+    """From how far all corners, given from the centre, are within the window."""
+    sideways = np.cross(up, back) / np.linalg.norm(np.cross(up, back))
+    upwards = np.cross(back, sideways)
+    tangent = math.tan(FIELD_OF_VIEW[dimension] / 2.0)
+    across = np.maximum(abs(corners @ upwards), abs(corners @ sideways) / aspect)
+    return float(np.max(np.maximum(across * MARGIN, LEAST) / tangent + corners @ back))
 
 
 def _triple(point: FloatArray) -> Triple:

@@ -45,7 +45,9 @@ def step(snapshot: Snapshot) -> str:
         f'<span style="border:1px solid {colour};color:{colour};border-radius:9px;padding:0 8px;'
         f'font-size:0.85em;font-weight:600;white-space:nowrap">{_text(word)}{who}</span>'
     )
-    return _block(f'<div style="display:flex;flex-wrap:wrap;gap:4px 8px;align-items:center"><b>{names}</b>{badge}</div>')
+    return _block(
+        f'<div style="display:flex;flex-wrap:wrap;gap:4px 8px;align-items:center"><b>{names}</b>{badge}</div>'
+    )
 
 
 def value(snapshot: Snapshot) -> str:
