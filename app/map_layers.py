@@ -105,7 +105,7 @@ def candidate_points(content: Content) -> Iterator[Drawable]:
     yield Drawable("candidates/points", "candidates", "points", places, palette.neutral, "first", 13, 8.0, colours)
     if content.dimension == 3:
         yield from _bars(content, places, values / values.max())
-        yield from _turn_axis(content, places)
+        yield from _turn_axis(content)
     if pair.candidate is not None:
         yield from _shown(content, _places(content, (pair.candidate,))[0])
 
@@ -132,11 +132,12 @@ def _bars(content: Content, places: Array32, shares: FloatArray) -> Iterator[Dra
     yield Drawable("candidates/bars", "candidates", "lines", np.stack((places, tops), axis=1), colour, depth=13)
 
 
-def _turn_axis(content: Content, places: Array32) -> Iterator[Drawable]:
-    """The axis of theta, beside the candidates."""
+def _turn_axis(content: Content) -> Iterator[Drawable]:
+    """The axis of theta, at a far corner of what is drawn."""
     colour = content.palette.neutral
-    corner = places[:, :2].min(axis=0) - 0.05 * _width(content)
-    ends = lift(np.stack((corner, corner)), _heights([-math.pi, math.pi], content))
+    left, _, _, top = content.bounds or (0.0, 0.0, 10.0, 10.0)
+    corner = (left, top)
+    ends = lift([corner, corner], _heights([-math.pi, math.pi], content))
     yield Drawable("candidates/axis", "candidates", "lines", ends[None], colour, depth=13, thickness=1.5)
     for degrees in (-180, 0, 180):
         at = (*corner, float(_heights(math.radians(degrees), content)))
