@@ -11,10 +11,10 @@ const SPANS = [
   ["minute", 60],
 ];
 
-export const whole = (value) => (isNumber(value) ? WHOLE.format(value) : MISSING);
-export const fixed = (value, digits) => (isNumber(value) ? value.toFixed(digits) : MISSING);
-export const metres = (value, digits = 2) => (isNumber(value) ? `${value.toFixed(digits)} m` : MISSING);
-export const degrees = (radians) => (isNumber(radians) ? ((radians * 180) / Math.PI).toFixed(1) : MISSING);
+export const whole = (value) => (isNumber(value) ? WHOLE.format(value).replaceAll(",", "\u202f") : MISSING);
+export const fixed = (value, digits) => (isNumber(value) ? signed(value.toFixed(digits)) : MISSING);
+export const metres = (value, digits = 2) => (isNumber(value) ? `${fixed(value, digits)} m` : MISSING);
+export const degrees = (radians) => (isNumber(radians) ? fixed((radians * 180) / Math.PI, 1) : MISSING);
 
 /** "1 scan", "12 scans". */
 export const count = (number, one, many = `${one}s`) => `${whole(number)} ${number === 1 ? one : many}`;
@@ -49,6 +49,11 @@ export function pose(value) {
   if (!value) return null;
   const [x, y, theta] = Array.isArray(value) ? value : [value.x, value.y, value.theta];
   return { x, y, theta };
+}
+
+/** A minus that is as wide as a plus, and none before a zero. */
+function signed(number) {
+  return number.replace(/^-(?=[0.]*$)/, "").replace("-", "−");
 }
 
 function isNumber(value) {

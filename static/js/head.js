@@ -17,15 +17,8 @@ function information(info) {
   text(byId("name"), info.name);
   const scans = info.logs.reduce((sum, log) => sum + log.scans, 0);
   text(byId("holds"), `${count(scans, "scan")}, ${count(info.counts.total, "integration")}`);
-  text(byId("need"), needs(info.counts));
   history("undo", "Undo", info.undo);
   history("redo", "Redo", info.redo);
-}
-
-function needs({ total, pending, matching }) {
-  if (total === 0) return "";
-  if (pending === 0 && matching === 0) return "Everything is decided";
-  return `${whole(pending)} of ${whole(total)} need you`;
 }
 
 function history(id, word, what) {

@@ -33,9 +33,9 @@ export class Project extends EventTarget {
     return this.index.get(id) ?? null;
   }
 
-  /** The ids of rows in a state; `above` true or false narrows to values above the threshold or not. */
-  ids(state, above = null) {
-    return this.rows.filter((row) => row.state === state && (above === null || Boolean(row.above) === above)).map((row) => row.id);
+  /** The ids of the rows in a state. */
+  ids(state) {
+    return this.rows.filter((row) => row.state === state).map((row) => row.id);
   }
 
   detail(id, heuristic, signal) {

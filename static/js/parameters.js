@@ -2,7 +2,7 @@
 
 import { get } from "./api.js";
 import { byId, fill, h, set, text } from "./dom.js";
-import { count } from "./format.js";
+import { count, whole } from "./format.js";
 
 export class ParameterDrawer {
   #fields = new Map();
@@ -127,6 +127,8 @@ function write({ parameter, input }, value) {
   else input.value = value ?? "";
 }
 
+const brief = (number) => (Number.isInteger(number) ? whole(number) : String(Number(number.toPrecision(4))));
+
 function words(name) {
   const plain = name.replaceAll("_", " ");
   return plain[0].toUpperCase() + plain.slice(1);
@@ -135,7 +137,7 @@ function words(name) {
 function bounds({ default: standard, minimum, maximum, above, below, kind }) {
   if (kind === "boolean") return `Default ${standard ? "on" : "off"}.`;
   if (kind === "choice") return `Default ${standard}.`;
-  const low = above !== null ? `above ${above}` : minimum !== null ? `from ${minimum}` : "";
-  const high = below !== null ? `below ${below}` : maximum !== null ? `up to ${maximum}` : "";
+  const low = above !== null ? `above ${brief(above)}` : minimum !== null ? `from ${brief(minimum)}` : "";
+  const high = below !== null ? `below ${brief(below)}` : maximum !== null ? `up to ${brief(maximum)}` : "";
   return `Default ${standard ?? "none"}; ${[low, high].filter(Boolean).join(", ")}.`;
 }

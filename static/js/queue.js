@@ -55,6 +55,7 @@ export class Queue {
     this.#scale = scale(this.project.rows, this.#threshold);
     this.list.show(this.#shown, this.view.integration);
     this.#chips();
+    this.#needs();
     this.#empty();
     this.#mark();
   }
@@ -114,6 +115,12 @@ export class Queue {
     }
   }
 
+  #needs() {
+    const [waiting, running] = ["pending", "matching"].map((state) => this.project.ids(state).length);
+    const all = this.project.rows.length;
+    text(byId("need"), waiting + running ? `${whole(waiting)} of ${whole(all)} need you` : all ? "Everything is decided" : "");
+  }
+
   #find(words) {
     this.#search = words.trim().toLowerCase();
     this.refresh();
@@ -157,7 +164,7 @@ export class Queue {
     text(state.lastElementChild, stateLabel(row.state));
     text(id, pair(row.id));
     drawBar(bar, row, this.#scale, this.#threshold);
-    text(value, row.value === null || row.value === undefined ? "" : metres(row.value));
+    text(value, row.value ? metres(row.value) : "");
     this.#note(note, row);
     set(element, "aria-selected", String(row.id === this.view.integration));
   }

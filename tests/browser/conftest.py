@@ -27,7 +27,10 @@ ARGUMENTS = (
     "--disable-background-networking",
     "--disable-component-update",
 )
-SERVE = "import sys; from pathlib import Path; from app.server import serve; serve(port=int(sys.argv[1]), workspace=Path(sys.argv[2]))"
+SERVE = (
+    "import sys; from pathlib import Path; from app.server import serve; "
+    "serve(port=int(sys.argv[1]), workspace=Path(sys.argv[2]))"
+)
 STARTED = re.compile(r"segmap is at (http://\S+?)/ ")
 STOP_SECONDS = 20.0
 MATCHING_SECONDS = 90.0
@@ -153,7 +156,7 @@ class Desk:
 
     def count(self, state: str) -> int:
         """The number on a filter of the queue."""
-        return int(self.page.locator(f"[data-filter={state}] .number").inner_text().replace(",", ""))
+        return int(self.page.locator(f"[data-filter={state}] .number").inner_text().replace("\u202f", ""))
 
     def row(self, integration: str) -> Locator:
         """The row of an integration."""

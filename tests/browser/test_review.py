@@ -131,3 +131,20 @@ def test_tablet(new_desk: Callable[..., Any], server: Any, project: str) -> None
     assert desk.page.evaluate("document.documentElement.scrollWidth") <= 820
     assert desk.nodes["/first/sensor"]["colours"] != []
     desk.picture("tablet")
+
+
+def test_second_thoughts(desk: Any) -> None:
+    """A decision can be taken back where it stands; a map of nothing is not exported, and the page says why."""
+    desk.page.locator("#export summary").click()
+    desk.page.get_by_text("Merged map, SVG").click()
+    desk.page.locator(".notice.error").wait_for()
+    assert "accept" in desk.page.locator(".notice.error p").inner_text().lower()
+    desk.errors.clear()
+    chosen = desk.selected
+    desk.page.keyboard.press("y")
+    desk.until(lambda: desk.count("accepted") == 1 and desk.selected != chosen, "the decision")
+    desk.page.locator("[data-filter=accepted]").click()
+    desk.row(chosen).click()
+    desk.page.get_by_role("button", name="Decide again").click()
+    desk.until(lambda: desk.count("accepted") == 0, "the undecided pair")
+    desk.page.get_by_text("No integration passes this filter.").wait_for()

@@ -109,7 +109,9 @@ def export(desk: Any) -> None:
     desk.page.locator("#tab-map").click()
     desk.page.locator("#components h3").first.wait_for()
     desk.page.keyboard.press("6")
+    desk.until(lambda: "being computed" not in desk.page.locator("#components").inner_text(), "the merged map")
     desk.until(lambda: any(name.startswith("/map/") for name in desk.nodes), "the merged map in the scene")
+    desk.page.wait_for_timeout(500)
     desk.picture("map")
     desk.page.locator("#export summary").click()
     with desk.page.expect_download() as saving:
@@ -140,11 +142,21 @@ def test_a_real_log_while_it_is_matched(new_desk: Callable[..., Any], server: An
     desk.page.get_by_role("button", name="Resume").wait_for()
     progress = server.get(f"/api{project}")["progress"]
     assert 0 < progress["done"] < progress["total"]
-    chosen = desk.selected
-    desk.page.keyboard.press("y")
-    desk.until(lambda: desk.row(chosen).count() == 0 or desk.count("accepted") == 1, "the decision")
+    for key, state, number in (("y", "accepted", 1), ("y", "accepted", 2), ("x", "rejected", 1)):
+        desk.page.wait_for_timeout(400)
+        desk.page.keyboard.press(key)
+        desk.until(lambda state=state, number=number: desk.count(state) == number, f"{number} {state}")
     desk.page.get_by_role("button", name="Resume").click()
-    desk.page.get_by_role("button", name="Cancel").wait_for()
-    desk.picture("real-log")
-    desk.page.get_by_role("button", name="Cancel").click()
-    desk.page.get_by_role("button", name="Resume").wait_for()
+    desk.until(lambda: server.get(f"/api{project}")["progress"]["done"] > progress["done"] + 20, "more pairs")
+    look_at(desk, "0.34-0.35")
+    desk.picture("workbench")
+
+
+def look_at(desk: Any, integration: str) -> None:
+    """Select a pair as a person who knows its name, and wait until it is drawn."""
+    desk.page.locator("#search").fill(integration)
+    desk.row(integration).click()
+    desk.page.locator("#search").fill("")
+    desk.until(lambda: desk.selected == integration, "the pair")
+    desk.until(lambda: "/first/chains/3" in desk.nodes, "its chains")
+    desk.page.wait_for_timeout(500)
