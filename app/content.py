@@ -67,8 +67,6 @@ class Placed:
     component: Component
     T_map_component: Pose2
     """where its frame is drawn; the frames of two components have no relation to each other"""
-    colour: int
-    """which colour of the palette"""
 
     @cached_property
     def map(self) -> SegmentMap:
@@ -86,15 +84,14 @@ def place(components: Iterable[Component], scans: Iterable[ScanId] = ()) -> tupl
     Components of one scan are left out: they are scans that nothing was integrated with.
     """
     wanted = next(iter(scans), None)
-    grown = [(index, c) for index, c in enumerate(c for c in components if len(c.scans) > 1)]
-    grown.sort(key=lambda item: (wanted not in item[1].scans, item[0]))
+    grown = sorted((c for c in components if len(c.scans) > 1), key=lambda c: wanted not in c.scans)
     placed: list[Placed] = []
     right = 0.0
-    for index, component in grown:
+    for component in grown:
         left, bottom, to, _ = component.map.bounds or (0.0, 0.0, 0.0, 0.0)
         shift = Pose2(right - left + GAP, -bottom, 0.0) if placed else Pose2.identity()
         right = shift.x + to
-        placed.append(Placed(component, shift, index))
+        placed.append(Placed(component, shift))
     return tuple(placed)
 
 
@@ -105,6 +102,8 @@ class Content:
     stage: str
     pair: Pair | None = None
     components: tuple[Component, ...] = ()
+    scans: int = 0
+    """of the whole project"""
     dimension: int = 2
     theme: str = "light"
     shown: Mapping[str, bool] = field(default_factory=dict)

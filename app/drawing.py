@@ -148,9 +148,9 @@ def _candidate_caption(pair: Pair) -> str:
 def _map_caption(content: Content) -> str:
     length = sum(float(placed.component.map.lengths.sum()) for placed in content.placed)
     scans = sum(len(placed.component.scans) for placed in content.placed)
-    alone = sum(len(c.scans) == 1 for c in content.components)
+    alone = content.scans - scans
     told = f"{_count(len(content.placed), 'component')} of {_count(scans, 'scan')}, {length:.0f} m of segments"
-    return told + (f"; {_count(alone, 'scan')} not placed" if alone else "")
+    return told + (f"; {_count(alone, 'scan')} not placed" if alone > 0 else "")
 
 
 def _in_map_caption(content: Content) -> str:

@@ -63,6 +63,7 @@ class Evidence:
             stage=looks.stage,
             pair=pair,
             components=tuple(self._session.components()) if looks.stage == "map" else (),
+            scans=len(self._session.scan_ids),
             dimension=looks.dimension,
             theme=looks.theme,
             shown=looks.shown,
@@ -98,14 +99,19 @@ class Evidence:
     def _message(self, looks: Looks, pair: Pair | None) -> str:
         """Why there is less to see than one might expect, or something else; empty where there is no reason to ask."""
         if looks.stage == "map":
-            grown = any(len(component.scans) > 1 for component in self._session.components())
-            return "" if grown else "Nothing is accepted yet: the merged map is empty."
+            return self._about_map()
         if pair is None:
             return "There is no pair to look at: the project has fewer than two scans."
         match = self.match(looks)
         if match is None:
             return self._unmatched(looks, pair)
         return self._elsewhere(pair) if match.ranked else " ".join(match.reasons)
+
+    def _about_map(self) -> str:
+        if self._session.components():
+            return ""
+        accepted = any(decision.verdict == "accepted" for decision in self._session.state.decisions.values())
+        return "The merged map is being computed." if accepted else "Nothing is accepted yet: the merged map is empty."
 
     def _unmatched(self, looks: Looks, pair: Pair) -> str:
         outcome = self._session.outcome(pair.integration, self.heuristic(looks))

@@ -39,7 +39,7 @@ def caption(content: Content) -> str:
 def draw(content: Content) -> Iterator[Drawable]:
     """Fine and bold lines, through the origin of the first map's frame."""
     step, palette = spacing(content), content.palette
-    for name, every, strength in (("fine", step, 0.17), ("bold", BOLD * step, 0.45)):
+    for name, every, strength in zip(("fine", "bold"), (step, BOLD * step), palette.grid, strict=True):
         colour = palette.faint(palette.neutral, strength)
         yield Drawable(f"grid/{name}", "grid", "lines", lines(_grid(content, every)), colour, depth=-2, thickness=1.0)
 

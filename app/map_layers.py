@@ -141,7 +141,9 @@ def _turn_axis(content: Content) -> Iterator[Drawable]:
     yield Drawable("candidates/axis", "candidates", "lines", ends[None], colour, depth=13, thickness=1.5)
     for degrees in (-180, 0, 180):
         at = (*corner, float(_heights(math.radians(degrees), content)))
-        yield label(f"candidates/axis {degrees}", "candidates", f"θ = {degrees}°", at, colour, depth=13)
+        yield label(
+            f"candidates/axis {degrees}", "candidates", f"θ = {degrees}°".replace("-", "−"), at, colour, depth=13
+        )
 
 
 def _shown(content: Content, at: Array32) -> Iterator[Drawable]:

@@ -22,6 +22,8 @@ DISTINCT = (0.5, 0.2)
 """metres and radians; candidates nearer to each other are one answer"""
 SENSOR = np.array([[0.28, 0.0], [-0.14, 0.16], [-0.14, -0.16]])
 """metres; a kite that looks where the sensor looks"""
+BESIDE_SENSOR = np.array([0.5, 0.0])
+"""metres, in the sensor's frame; where a rival's label has its place"""
 FRAMES: tuple[Frame, Frame] = ("first", "second")
 
 
@@ -136,8 +138,8 @@ def rival_segments(content: Content) -> Iterator[Drawable]:
     faint = content.palette.faint(colour, 0.45)
     yield Drawable("rivals/segments", "rivals", "lines", lines(ghosts), faint, depth=1, thickness=1.0)
     for place, (rank, rival) in enumerate(found, 1):
-        text = f"#{rank + 1}: {rival.value:.2f} m"
-        yield label(f"rivals/label {place}", "rivals", text, (rival.T_1_2.x, rival.T_1_2.y), colour, depth=2)
+        text, at = f"#{rank + 1}: {rival.value:.2f} m", rival.T_1_2 @ BESIDE_SENSOR
+        yield label(f"rivals/label {place}", "rivals", text, at, colour, depth=2)
 
 
 def chains(content: Content) -> Iterator[Drawable]:

@@ -34,6 +34,8 @@ class Palette:
     """matching chains, and components of the map, in turn"""
     values: tuple[RGB, ...]
     """from a low to a high value"""
+    grid: tuple[float, float]
+    """strength of fine and of bold lines"""
 
     def faint(self, colour: RGB, strength: float = 0.35) -> RGB:
         """A colour mixed into the background; strength 1 leaves it as it is."""
@@ -82,6 +84,7 @@ PALETTES = {
         bad=_rgb("c22f2f"),
         chains=_several("0067be e83c28 1d978f c3225b 52b4ff 662512 5834ed ff9400"),
         values=_several("c9d3de 7fb2d6 2f86c1 1b5a97 0b2f5c"),
+        grid=(0.17, 0.45),
     ),
     "dark": Palette(
         background=_rgb("141414"),
@@ -94,6 +97,7 @@ PALETTES = {
         bad=_rgb("ff7b72"),
         chains=_several("249cff ff8a1f 12b886 ff63bd bde3ff a67c3a b745ca ffe066"),
         values=_several("3c4754 2f6690 3a9bc9 84d2dc f4f1a6"),
+        grid=(0.27, 0.5),
     ),
 }
 THEMES = tuple(PALETTES)

@@ -96,6 +96,8 @@ class Cameras:
 
     def _keep_fitted(self, client: viser.ClientHandle) -> None:
         """Fit again when the window's shape changed, unless a person has moved the camera."""
+        if client.client_id not in self._server.get_clients():
+            return  # it has gone since
         with self._lock:
             aspect, position = self._put.get(client.client_id, (0.0, (0.0, 0.0, 0.0)))
         if abs(client.camera.aspect - aspect) < 1e-3:

@@ -248,7 +248,7 @@ def test_components_lie_apart(moved_room: Pair) -> None:
     assert moved_room.candidate is not None
     pose = moved_room.candidate.T_1_2
     held = merge_accepted(maps, [(scans[0], scans[1], pose), (scans[2], scans[3], pose)], PARAMETERS)
-    picture = draw(Content("map", replace(moved_room, scans=(scans[2], scans[3])), held))
+    picture = draw(Content("map", replace(moved_room, scans=(scans[2], scans[3])), held, scans=6))
     drawn = [d for d in picture.drawables if d.layer == "map" and d.kind == "lines"]
     assert len(drawn) == 2
     assert drawn[0].points[:, :, 0].max() < drawn[1].points[:, :, 0].min()

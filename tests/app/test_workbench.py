@@ -290,6 +290,18 @@ def test_changed_parameters_have_the_pair_matched_anew(view: View, session: Sess
     assert view.snapshot()["candidate"] == 0
 
 
+def test_the_map_stage_says_why_it_is_empty_and_then_is_not(view: View, session: Session) -> None:
+    """Nothing accepted: so it says; after a decision the map comes by itself."""
+    view.set_stage("map")
+    assert view.snapshot()["messages"] == ["Nothing is accepted yet: the merged map is empty."]
+    ear = Ear(view)
+    session.decide([here(view)], "accepted")
+    ear.wait_for(lambda e: any(layer["name"] == "map" and "2 scans" in layer["caption"] for layer in e["layers"]))
+    assert view.snapshot()["messages"] == []
+    caption = next(layer["caption"] for layer in view.snapshot()["layers"] if layer["name"] == "map")
+    assert "5 scans not placed" in caption
+
+
 # --- what pages ask for ---------------------------------------------------------------------------
 
 
