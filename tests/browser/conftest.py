@@ -183,7 +183,7 @@ class Desk:
         """viser tells everybody who has no graphics card."""
         note = self.scene.get_by_text("Software WebGL rendering detected")
         if note.count():
-            self.scene.locator("button.mantine-Notification-closeButton").first.click()
+            self.scene.locator("button.mantine-Notification-closeButton").first.evaluate("button => button.click()")
             note.wait_for(state="detached")
 
 
