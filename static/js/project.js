@@ -106,7 +106,7 @@ function keyboard() {
   const actions = { next: () => queue.turn(1), previous: () => queue.turn(-1), search, help };
   for (const name of ["accept", "reject"]) actions[name] = () => view.act(name, view.integration).catch(failed);
   for (const name of ["skip", "undo", "redo", "toggle_dimension", "fit"]) actions[name] = act(name);
-  actions.stage = (number) => view.act("set_stage", view.snapshot.stages[number - 1]).catch(failed);
+  actions.stage = (number) => view.snapshot.stages && view.act("set_stage", view.snapshot.stages[number - 1]).catch(failed);
   for (const what of ["candidate", "heuristic", "stage"]) {
     for (const way of ["next", "previous"]) actions[`${way}_${what}`] = act(`${way}_${what}`);
   }
