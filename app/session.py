@@ -126,7 +126,7 @@ class Session:
     def match(self, integration: str, heuristic: str | None = None) -> Match | None:
         """What was found for an integration; None: not computed yet. Default: by the project's heuristic."""
         found = self._matching.match(self._checked(integration), self._heuristic(heuristic))
-        return None if found is None else found.judged(self._state.parameters.value_threshold)
+        return None if found is None else found.judged(self._state.parameters)
 
     def outcome(self, integration: str, heuristic: str | None = None) -> Outcome | None:
         """The same in short, with the reason where it failed."""

@@ -20,7 +20,7 @@ from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, wrap
 from segmap.segments import Order, SegmentMap
 
-__all__ = ["HEURISTICS", "Angles", "Candidates", "angles", "candidates", "segment_pairs"]
+__all__ = ["HEURISTICS", "PAPER_HEURISTICS", "Angles", "Candidates", "angles", "candidates", "segment_pairs"]
 
 POSE_RESOLUTION = 1e-9
 """metres and radians; poses that agree to this are one pose"""
@@ -136,8 +136,10 @@ _SELECTIONS: dict[str, Callable[[SegmentMap, Parameters], IntArray]] = {
     "consecutive": _consecutive,
     "histogram": _histogram,
 }
-HEURISTICS = ("all", "consecutive", "random", "histogram")
+PAPER_HEURISTICS = ("all", "consecutive", "random", "histogram")
 """The paper's heuristics, by name; ``random`` draws pairs of angles and so chooses for both maps at once."""
+HEURISTICS = (*PAPER_HEURISTICS, "extremes")
+"""and ``extremes``, beyond the paper: a single segment laid on a single segment, no angle needed."""
 
 
 def segment_pairs(segment_map: SegmentMap, heuristic: str, parameters: Parameters) -> IntArray:
@@ -210,11 +212,12 @@ def candidates(map_1: SegmentMap, map_2: SegmentMap, heuristic: str, parameters:
     Raises:
         ParameterError: there is no such heuristic.
     """
-    blocks = (
-        _random_candidates(map_1, map_2, parameters)
-        if heuristic == "random"
-        else _paired_candidates(map_1, map_2, heuristic, parameters)
-    )
+    if heuristic == "random":
+        blocks = _random_candidates(map_1, map_2, parameters)
+    elif heuristic == "extremes":
+        blocks = _extreme_candidates(map_1, map_2)
+    else:
+        blocks = _paired_candidates(map_1, map_2, heuristic, parameters)
     seen = _Seen()
     for block in blocks:
         yield block.take(seen.new(block.poses))
@@ -303,6 +306,35 @@ def _equal_drawn(
         headings_1, _vertices(map_1, pairs_1, headings_1), headings_2, _vertices(map_2, pairs_2, headings_2)
     )
     return Candidates(poses, pairs_1, pairs_2, draws=len(keep))
+
+
+def _extreme_candidates(map_1: SegmentMap, map_2: SegmentMap) -> Iterator[Candidates]:
+    """Beyond the paper: a segment of map 2 laid on one of map 1, starts, ends or middles together.
+
+    Three candidates for each pair of segments, n_1 n_2 pairs; an undirected segment is laid both ways.
+    """
+    first, second = np.divmod(np.arange(len(map_1) * len(map_2)), max(1, len(map_2)))
+    flips = (0.0,) if map_1.directed.all() and map_2.directed.all() else (0.0, math.pi)
+    for turn in flips:
+        theta = wrap(map_1.headings[first] - map_2.headings[second] + turn)
+        for share in (0.0, 1.0, 0.5):
+            anchor_1 = _along(map_1, first, share)
+            anchor_2 = _along(map_2, second, 1.0 - share if turn else share)
+            shift = anchor_1 - _turned(anchor_2, theta)
+            pairs = np.repeat(np.stack((first, second))[..., None], 2, axis=-1)
+            yield Candidates(np.column_stack((shift, theta)), *pairs)
+
+
+def _along(segment_map: SegmentMap, rows: IntArray, share: float) -> FloatArray:
+    """Points of segments: 0 the start, 1 the end."""
+    start, end = segment_map.coordinates[rows, :2], segment_map.coordinates[rows, 2:]
+    return start + share * (end - start)
+
+
+def _turned(points: FloatArray, theta: FloatArray) -> FloatArray:
+    cosine, sine = np.cos(theta), np.sin(theta)
+    x, y = points.T
+    return np.stack((cosine * x - sine * y, sine * x + cosine * y), axis=-1)
 
 
 class _Seen:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.distance import pdist
@@ -67,7 +67,8 @@ def fuse(
         members = SegmentMap.joined([map_1.take(chain.first), moved_2.take(chain.second)])
         polylines.append(polyline(members, parameters))
         parts.append(_as_map(polylines[-1], members, parameters))  # line 12
-    return Fusion(SegmentMap.joined(parts), tuple(polylines))
+    fused = replace(SegmentMap.joined(parts), sights=map_1.sights + moved_2.sights)
+    return Fusion(fused, tuple(polylines))
 
 
 def _unmatched(segment_map: SegmentMap, matched: list[int]) -> SegmentMap:

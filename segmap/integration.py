@@ -5,32 +5,49 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 from pydantic import TypeAdapter
 
-from segmap.candidates import Candidates, candidates
+from segmap.candidates import HEURISTICS, PAPER_HEURISTICS, Candidates, candidates
 from segmap.chains import MatchingChain, matching_chains
 from segmap.errors import ParameterError
-from segmap.evaluation import best, evaluate
+from segmap.evaluation import best, evaluate, matching_values
 from segmap.fusion import Fusion, fuse
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, Pose2
+from segmap.refinement import Uncertainty, uncertainty
 from segmap.segments import SegmentMap
+from segmap.verdict import Findings, Verdict, confidence, judge_evidence, judge_value
+from segmap.verification import Verified, verify
+from segmap.visibility import Evidence, evidence, sighting
 
-__all__ = ["MODES", "Candidate", "Integration", "Match", "Verdict", "integrate", "match_maps"]
+__all__ = [
+    "AUTOMATIC",
+    "DEFAULT_HEURISTIC",
+    "MODES",
+    "Candidate",
+    "Integration",
+    "Match",
+    "Verdict",
+    "heuristics",
+    "integrate",
+    "match_maps",
+]
 
-MODES = ("paper",)
-"""``paper``: Algorithms 1 to 5 as the paper has them"""
+MODES = ("paper", "verified")
+"""``paper``: Algorithms 1 to 5 as the paper has them; ``verified``: the same, then evidence beyond the paper"""
+AUTOMATIC = "automatic"
+"""verified mode's own choice of heuristic: cheapest first, until the evidence is clear"""
+STAGES = ("extremes", "all")
+"""what ``automatic`` tries in turn"""
+DEFAULT_HEURISTIC = {"paper": "all", "verified": AUTOMATIC}
+"""the heuristic of each mode where none is asked for"""
 
 
-class Verdict(StrEnum):
-    """What the program says of an integration; a person has the last word."""
-
-    ACCEPTED = "accepted"
-    REVIEW = "review"
-    REJECTED = "rejected"
+def heuristics(mode: str) -> tuple[str, ...]:
+    """The heuristics of a mode: the paper's four, or those and what goes beyond."""
+    return PAPER_HEURISTICS if mode == "paper" else (AUTOMATIC, *HEURISTICS)
 
 
 @dataclass(frozen=True)
@@ -46,6 +63,12 @@ class Candidate:
     """those of map 2"""
     index: int
     """place among the candidates in the order they were found, from 0"""
+    score: float | None = None
+    """verified: support less conflict, metres"""
+    evidence: Evidence | None = None
+    """verified: what lines of sight say"""
+    uncertainty: Uncertainty | None = None
+    """verified: how well the geometry holds the pose"""
 
 
 @dataclass(frozen=True)
@@ -70,6 +93,8 @@ class Match:
     reasons: tuple[str, ...]
     """the verdict in words"""
     milliseconds: float
+    confidence: float | None = None
+    """verified: calibrated probability that the best candidate is right"""
 
     @property
     def best(self) -> Candidate | None:
@@ -88,14 +113,14 @@ class Match:
 
     @property
     def score(self) -> float:
-        """What matches of one mode are ranked by: the value, metres."""
-        return self.value
+        """What matches of one mode are ranked by: the confidence, or in paper mode the value in metres."""
+        return self.value if self.confidence is None else self.confidence
 
-    def judged(self, value_threshold: float) -> Match:
-        """The same match, with its verdict by another threshold, in metres; nothing is searched again."""
+    def judged(self, parameters: Parameters) -> Match:
+        """The same match, with its verdict by other thresholds; nothing is searched again."""
         if not self.ranked:
             return self
-        verdict, reasons = _judgement(self.value, value_threshold)
+        verdict, reasons = _judgement(self.ranked, parameters)
         return replace(self, verdict=verdict, reasons=reasons)
 
     def to_json(self) -> str:
@@ -128,7 +153,7 @@ def integrate(
     map_1: SegmentMap,
     map_2: SegmentMap,
     parameters: Parameters | None = None,
-    heuristic: str = "all",
+    heuristic: str | None = None,
     mode: str = "paper",
     *,
     workers: int = 1,
@@ -151,7 +176,7 @@ def match_maps(
     map_1: SegmentMap,
     map_2: SegmentMap,
     parameters: Parameters | None = None,
-    heuristic: str = "all",
+    heuristic: str | None = None,
     mode: str = "paper",
     *,
     workers: int = 1,
@@ -159,45 +184,70 @@ def match_maps(
 ) -> Match:
     """The first two steps of INTEGRATE, "scan matching": candidate transformations, and the best of them.
 
+    Without a heuristic the mode's default is taken.
+
     Raises: as :func:`integrate`.
     """
     if mode not in MODES:
         raise ParameterError(f"There is no mode {mode!r}. Modes are: {', '.join(MODES)}.")
-    parameters = parameters or Parameters()
+    task = _Task(map_1, map_2, parameters or Parameters(), heuristic or DEFAULT_HEURISTIC[mode], workers, check)
     started = time.perf_counter()
-    found, values = _searched(map_1, map_2, heuristic, parameters, workers, check)
-    ranked = tuple(_candidate(found, values, row) for row in best(values, parameters.ranked_candidates))
-    verdict, reasons = _verdict(ranked, values, (map_1, map_2), parameters)
+    found = _verified(task) if mode == "verified" else _as_the_paper(task)
+    verdict, reasons = _verdict(found, task)
     return Match(
         mode=mode,
-        heuristic=heuristic,
+        heuristic=task.heuristic,
         segments=(len(map_1), len(map_2)),
-        ranked=ranked,
-        candidates=len(values),
-        discarded=int(np.isnan(values).sum()),
-        draws=found.draws if heuristic == "random" else None,
-        chains=matching_chains(map_1, map_2, ranked[0].T_1_2, parameters) if ranked else (),
+        ranked=found.ranked,
+        candidates=found.tried,
+        discarded=found.discarded,
+        draws=found.draws if task.heuristic == "random" else None,
+        chains=matching_chains(map_1, map_2, found.ranked[0].T_1_2, task.parameters) if found.ranked else (),
         verdict=verdict,
         reasons=reasons,
         milliseconds=1000.0 * (time.perf_counter() - started),
+        confidence=_confidence(found.ranked) if mode == "verified" else None,
     )
 
 
-def _searched(
-    map_1: SegmentMap,
-    map_2: SegmentMap,
-    heuristic: str,
-    parameters: Parameters,
-    workers: int,
-    check: Callable[[], None] | None,
-) -> tuple[Candidates, FloatArray]:
+@dataclass(frozen=True, eq=False)
+class _Task:
+    map_1: SegmentMap
+    map_2: SegmentMap
+    parameters: Parameters
+    heuristic: str
+    workers: int
+    check: Callable[[], None] | None
+
+
+@dataclass(frozen=True)
+class _Found:
+    ranked: tuple[Candidate, ...]
+    tried: int
+    discarded: int = 0
+    draws: int = 0
+
+
+# --- paper mode -----------------------------------------------------------------------------------
+
+
+def _as_the_paper(task: _Task) -> _Found:
+    """Algorithms 2 or 3, then 4: every candidate's value, and the best."""
+    found, values = _evaluated(task, task.heuristic)
+    ranked = tuple(_candidate(found, values, row) for row in best(values, task.parameters.ranked_candidates))
+    return _Found(ranked, len(values), int(np.isnan(values).sum()), found.draws)
+
+
+def _evaluated(task: _Task, heuristic: str) -> tuple[Candidates, FloatArray]:
     """All candidates and their values; ``random`` may stop after a round that is good enough (III-A2)."""
     blocks: list[Candidates] = []
     values: list[FloatArray] = []
-    for block in candidates(map_1, map_2, heuristic, parameters):
+    for block in candidates(task.map_1, task.map_2, heuristic, task.parameters):
         blocks.append(block)
-        values.append(evaluate(map_1, map_2, block.poses, parameters, workers=workers, check=check))
-        if block.draws and _good_enough(values[-1], parameters.good_enough):
+        values.append(
+            evaluate(task.map_1, task.map_2, block.poses, task.parameters, workers=task.workers, check=task.check)
+        )
+        if block.draws and _good_enough(values[-1], task.parameters.good_enough):
             break
     return Candidates.joined(blocks), np.concatenate([np.empty(0), *values])
 
@@ -207,46 +257,112 @@ def _good_enough(values: FloatArray, enough: float | None) -> bool:
 
 
 def _candidate(found: Candidates, values: FloatArray, row: int) -> Candidate:
+    return Candidate(Pose2(*found.poses[row]), float(values[row]), *_angles(found, row), index=int(row))
+
+
+def _angles(found: Candidates, row: int) -> tuple[tuple[int, int], tuple[int, int]]:
     (a, b), (c, d) = found.angles_1[row], found.angles_2[row]
-    return Candidate(
-        T_1_2=Pose2(*found.poses[row]),
-        value=float(values[row]),
-        angle_1=(int(a), int(b)),
-        angle_2=(int(c), int(d)),
-        index=int(row),
+    return (int(a), int(b)), (int(c), int(d))
+
+
+# --- verified mode --------------------------------------------------------------------------------
+
+
+def _verified(task: _Task) -> _Found:
+    """The heuristic's candidates on the evidence; ``automatic`` goes on until the verdict is clear."""
+    seen_1, seen_2 = sighting(task.map_1), sighting(task.map_2)
+    if seen_1 is None or seen_2 is None:
+        return _as_the_paper(replace(task, heuristic=_by_value(task.heuristic)))
+    found, kept = Candidates.joined([]), None
+    ranked: tuple[Candidate, ...] = ()
+    for heuristic in STAGES if task.heuristic == AUTOMATIC else (task.heuristic,):
+        block = _worth_judging(task, heuristic)
+        if len(block):
+            fresh = verify(seen_1, seen_2, block.poses, task.parameters)
+            kept = kept.joined(fresh, len(found), task.parameters) if kept else fresh
+        found = Candidates.joined([found, block])
+        ranked = _ranked(task, found, kept) if kept else ()
+        if ranked and _judgement(ranked, task.parameters)[0] is Verdict.ACCEPTED:
+            break
+    return _Found(ranked, len(found), draws=found.draws)
+
+
+def _by_value(heuristic: str) -> str:
+    """What to try where nothing is known of lines of sight."""
+    return DEFAULT_HEURISTIC["paper"] if heuristic == AUTOMATIC else heuristic
+
+
+def _worth_judging(task: _Task, heuristic: str) -> Candidates:
+    """All candidates of a heuristic, or the best by value where there are many."""
+    if task.check is not None:
+        task.check()
+    most = task.parameters.judged_candidates
+    found = Candidates.joined(list(candidates(task.map_1, task.map_2, heuristic, task.parameters)))
+    if len(found) <= most:
+        return found
+    values = evaluate(task.map_1, task.map_2, found.poses, task.parameters, workers=task.workers, check=task.check)
+    return found.take(np.sort(best(values, most)))
+
+
+def _ranked(task: _Task, found: Candidates, kept: Verified) -> tuple[Candidate, ...]:
+    """The distinct refined candidates, best first."""
+    return tuple(
+        Candidate(
+            T_1_2,
+            float(matching_values(task.map_1, task.map_2, T_1_2, task.parameters)[1].sum()),
+            *_angles(found, int(row)),
+            index=int(row),
+            score=float(score),
+            evidence=evidence(totals),
+            uncertainty=uncertainty(normal, task.parameters),
+        )
+        for row, T_1_2, totals, score, normal in zip(
+            kept.rows, (Pose2(*pose) for pose in kept.poses), kept.totals, kept.scores, kept.normals, strict=True
+        )
     )
 
 
 # --- the verdict, in words ------------------------------------------------------------------------
 
 
-def _verdict(
-    ranked: tuple[Candidate, ...],
-    values: FloatArray,
-    maps: tuple[SegmentMap, SegmentMap],
-    parameters: Parameters,
-) -> tuple[Verdict, tuple[str, ...]]:
-    """Valid only above the threshold (IV-B, V-B); otherwise the nearest criterion that failed."""
-    if not ranked:
-        return Verdict.REJECTED, (_why_none(values, maps),)
-    return _judgement(ranked[0].value, parameters.value_threshold)
+def _verdict(found: _Found, task: _Task) -> tuple[Verdict, tuple[str, ...]]:
+    """The judgement on the best candidate; where there is none, the nearest criterion that failed."""
+    if not found.ranked:
+        return Verdict.REJECTED, (_why_none(found, task),)
+    return _judgement(found.ranked, task.parameters)
 
 
-def _judgement(value: float, threshold: float) -> tuple[Verdict, tuple[str, ...]]:
-    if value > threshold:
-        return Verdict.ACCEPTED, (f"The value, {value:.2f} m, is above the threshold of {threshold:.2f} m.",)
-    return Verdict.REJECTED, (f"The best value, {value:.2f} m, is not above the threshold of {threshold:.2f} m.",)
+def _judgement(ranked: tuple[Candidate, ...], parameters: Parameters) -> tuple[Verdict, tuple[str, ...]]:
+    """By evidence where there is any, by value alone otherwise."""
+    findings = _findings(ranked)
+    if findings is None:
+        return judge_value(ranked[0].value, parameters)
+    return judge_evidence(ranked[0].value, findings, parameters)
 
 
-def _why_none(values: FloatArray, maps: tuple[SegmentMap, SegmentMap]) -> str:
-    for name, segment_map in zip(("first", "second"), maps, strict=True):
+def _findings(ranked: tuple[Candidate, ...]) -> Findings | None:
+    """What speaks for and against the best candidate; None without evidence."""
+    first = ranked[0] if ranked else None
+    if first is None or first.score is None or first.evidence is None or first.uncertainty is None:
+        return None
+    rival = max((c.score for c in ranked[1:] if c.score is not None), default=0.0)
+    return Findings(first.score, first.score - max(rival, 0.0), first.evidence, first.uncertainty.weakest)
+
+
+def _confidence(ranked: tuple[Candidate, ...]) -> float:
+    findings = _findings(ranked)
+    return 0.0 if findings is None else confidence(findings)
+
+
+def _why_none(found: _Found, task: _Task) -> str:
+    for name, segment_map in (("first", task.map_1), ("second", task.map_2)):
         if len(segment_map) < 2:
             count = "one segment" if len(segment_map) else "no segments"
             return f"The {name} map has {count}; an angle takes two. Try a smaller min_segment_length."
-    if not len(values):
+    if not found.tried:
         return (
             "No angle of one map equals an angle of the other. Try another heuristic or a larger tolerance of angles."
         )
-    if np.isnan(values).all():
-        return f"All {len(values)} candidates were discarded: long segments cross. Try a larger segment_length_refuse."
-    return f"None of {len(values)} candidates brings any two segments together."
+    if found.discarded == found.tried:
+        return f"All {found.tried} candidates were discarded: long segments cross. Try a larger segment_length_refuse."
+    return f"None of {found.tried} candidates brings any two segments together."

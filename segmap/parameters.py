@@ -116,6 +116,42 @@ class Parameters(BaseModel):
         50, "", "How many of the best candidates an integration keeps for inspection.", ge=1, le=10000
     )
 
+    # evidence (beyond the paper: verified mode)
+    sight_tolerance: float = _parameter(
+        0.2, "m", "A return supports a candidate when the other map sees a surface within this.", gt=0.0, le=2.0
+    )
+    shadow_depth: float = _parameter(
+        0.6, "m", "A return this close behind a surface that the other map sees speaks against it.", ge=0.0, le=10.0
+    )
+    conflict_weight: float = _parameter(
+        2.0, "", "What a metre seen through takes from the score, against a metre supported.", ge=0.0, le=100.0
+    )
+    shadow_weight: float = _parameter(
+        1.0, "", "What a metre close behind a seen surface takes from the score.", ge=0.0, le=100.0
+    )
+    unseen_weight: float = _parameter(
+        0.2, "", "What a metre that the other map cannot judge takes from the score.", ge=0.0, le=100.0
+    )
+    judged_candidates: int = _parameter(
+        1500, "", "How many of the best candidates by value are judged by their lines of sight.", ge=1, le=1000000
+    )
+    refined_candidates: int = _parameter(
+        48, "", "How many distinct ones of these are refined and judged again.", ge=1, le=10000
+    )
+    refine_gate: float = _parameter(
+        0.5, "m", "Refinement begins with returns up to this far from a surface.", gt=0.0, le=5.0
+    )
+    rival_distance: float = _parameter(
+        0.25, "m", "Poses nearer than this, and than the rival angle, are one pose.", gt=0.0, le=10.0
+    )
+    rival_angle: float = _parameter(
+        0.14, "rad", "Poses nearer than this, and than the rival distance, are one pose.", gt=0.0, le=math.pi
+    )
+    confidence_accept: float = _parameter(0.9, "", "verified: accepted at this confidence and above.", ge=0.0, le=1.0)
+    confidence_review: float = _parameter(
+        0.1, "", "verified: below this confidence rejected; between the two a person decides.", ge=0.0, le=1.0
+    )
+
     # fusion (III-C)
     fusion_tolerance: float = _parameter(
         0.05, "m", "Farthest a matched segment may lie from the polyline that replaces it (III-C).", gt=0.0, le=1.0
@@ -184,12 +220,14 @@ _PAPER_LAB: dict[str, Any] = {
 
 PRESETS: dict[str, Parameters] = {
     "default": Parameters(),
+    "verified": Parameters(value_threshold=0.5),
     "paper-lab": Parameters(**_PAPER_LAB),
     "paper-gates": Parameters(
         **{**_PAPER_LAB, "max_range": None, "point_distance_tolerance": 0.010, "segment_distance_threshold": 10.0}
     ),
 }
-"""The shipped default (one set for every sensor) and the paper's two sets (Sections V-A and V-C)."""
+"""The shipped default (one set for every sensor), the same for verified mode, where evidence decides and the
+value is only a floor, and the paper's two sets (Sections V-A and V-C)."""
 
 
 def preset(name: str) -> Parameters:

@@ -22,7 +22,7 @@ LEAST_LENGTH = 1e-9
 FARTHEST = 1e8
 """metres; no map reaches farther from its origin"""
 
-__all__ = ["Order", "SegmentMap", "Source", "extract"]
+__all__ = ["Order", "SegmentMap", "Sight", "Source", "extract"]
 
 
 class Order(StrEnum):
@@ -46,6 +46,14 @@ class Source:
 
 
 @dataclass(frozen=True, eq=False)
+class Sight:
+    """A scan and where its sensor stood: what a map knows of the space between its walls."""
+
+    T_map_sensor: Pose2
+    scan: LaserScan
+
+
+@dataclass(frozen=True, eq=False)
 class SegmentMap:
     """A scan or a partial map: line segments in one frame.
 
@@ -62,6 +70,8 @@ class SegmentMap:
     """shape (segments,); default: all"""
     sources: tuple[tuple[Source, ...], ...] = None  # type: ignore[assignment]
     """for each segment, the segments of scans it came from; none: a connector, or unknown"""
+    sights: tuple[Sight, ...] = ()
+    """the scans the map was made of, for lines of sight"""
 
     def __post_init__(self) -> None:
         coordinates = _checked_coordinates(self.coordinates)
@@ -109,17 +119,18 @@ class SegmentMap:
     def moved(self, T_to_here: Pose2) -> SegmentMap:
         """The same map in another frame: every point p becomes ``T_to_here @ p``."""
         points = T_to_here @ self.coordinates.reshape(-1, 2, 2)
-        return SegmentMap(points.reshape(-1, 4), self.order, self.directed, self.sources)
+        sights = tuple(Sight(T_to_here @ sight.T_map_sensor, sight.scan) for sight in self.sights)
+        return SegmentMap(points.reshape(-1, 4), self.order, self.directed, self.sources, sights)
 
     def take(self, indices: Sequence[int] | IntArray) -> SegmentMap:
-        """Some of the segments, as a partial map."""
+        """Some of the segments, as a partial map without sights."""
         rows = np.asarray(indices, dtype=np.int64)
         sources = tuple(self.sources[i] for i in rows)
         return SegmentMap(self.coordinates[rows], Order.NONE, self.directed[rows], sources)
 
     @classmethod
     def joined(cls, maps: Iterable[SegmentMap]) -> SegmentMap:
-        """All segments of some maps of one frame, as a partial map; nothing is fused."""
+        """All segments and sights of some maps of one frame, as a partial map; nothing is fused."""
         parts = list(maps)
         if not parts:
             return cls.empty()
@@ -128,6 +139,7 @@ class SegmentMap:
             Order.NONE,
             np.concatenate([part.directed for part in parts]),
             tuple(source for part in parts for source in part.sources),
+            tuple(sight for part in parts for sight in part.sights),
         )
 
 
@@ -167,6 +179,7 @@ def extract(scan: LaserScan, parameters: Parameters, log: int = 0, index: int = 
         coordinates,
         Order.RING if scan.all_round else Order.BEAMS,
         sources=tuple((Source(log, index, i),) for i in range(len(coordinates))),
+        sights=(Sight(Pose2.identity(), scan),),
     )
 
 

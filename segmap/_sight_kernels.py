@@ -1,0 +1,358 @@
+"""The inner loops over beams: lines of sight and refinement. Same rules as :mod:`segmap._kernels`."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from segmap.pose import FloatArray, IntArray
+
+__all__ = [
+    "CLASSES",
+    "CONTRADICTED",
+    "SHADOWED",
+    "SUPPORTED",
+    "UNSEEN",
+    "Sighting",
+    "classify",
+    "distinct",
+    "look",
+    "refine",
+]
+
+SUPPORTED, CONTRADICTED, SHADOWED, UNSEEN = range(4)
+CLASSES = 4
+NEIGHBOURS = 3
+"""beams to either side of a point's own in which refinement looks for its surface"""
+_MOVE_STEP = 0.3
+"""metres; refinement moves no farther in one step"""
+_TURN_STEP = 0.1
+"""radians; nor turns farther"""
+
+_compiled = njit(cache=True, nogil=True, error_model="numpy")
+_inlined = njit(cache=True, nogil=True, error_model="numpy", inline="always")
+
+
+class Sighting(NamedTuple):
+    """What some sensors saw of a map, in arrays."""
+
+    points: FloatArray
+    """(m, 3): x, y of returns in the map's frame, and the width of the beam there, metres"""
+    beams: FloatArray
+    """(n, 5): of every beam of every sensor, x, y in the sensor's frame and range (NaN: no return), and the
+    least and the largest range around it, over one beam before and two after (inf and -inf: none)"""
+    sensors: FloatArray
+    """(s, 8): cosine, sine, x, y of the sensor's pose; first angle, angle step; first beam, number of beams"""
+
+
+@_inlined
+def _beam_of(x, y, sensors, s):  # type: ignore[no-untyped-def]
+    """The beam at or just before the direction of a point of the sensor's frame; -1: just before the first."""
+    turn = 2.0 * math.pi / abs(sensors[s, 5])
+    beam = (math.atan2(y, x) - sensors[s, 4]) / sensors[s, 5]
+    beam -= turn * math.floor(beam / turn)
+    if beam >= turn - 1.0 and beam >= sensors[s, 7]:
+        return -1
+    return int(beam)
+
+
+@_inlined
+def _wrapped(beam, sensors, s):  # type: ignore[no-untyped-def]
+    """The row of a beam among all beams; -1 where the sensor has none there."""
+    count = int(sensors[s, 7])
+    if beam < 0 or beam >= count:
+        if (count + 0.5) * abs(sensors[s, 5]) < 2.0 * math.pi:
+            return -1
+        beam = (beam + count) % count
+    return int(sensors[s, 6]) + beam
+
+
+@_compiled
+def _surface_distance(x, y, beam, beams, sensors, s, gap):  # type: ignore[no-untyped-def]
+    """Squared distance of a point from the surface seen around a beam: returns, joined where closer than ``gap``."""
+    nearest = np.inf
+    for step in range(-1, 3):
+        a = _wrapped(beam + step, sensors, s)
+        if a < 0 or math.isnan(beams[a, 2]):
+            continue
+        dx = x - beams[a, 0]
+        dy = y - beams[a, 1]
+        nearest = min(nearest, dx * dx + dy * dy)
+        b = _wrapped(beam + step + 1, sensors, s) if step < 2 else -1
+        if b < 0 or math.isnan(beams[b, 2]):
+            continue
+        ex = beams[b, 0] - beams[a, 0]
+        ey = beams[b, 1] - beams[a, 1]
+        squared = ex * ex + ey * ey
+        if 0.0 < dx * ex + dy * ey < squared < gap * gap:
+            nearest = min(nearest, (dx * ey - dy * ex) ** 2 / squared)
+    return nearest
+
+
+@_compiled
+def _seen_by(x, y, beams, sensors, s, tolerance, gap, depth):  # type: ignore[no-untyped-def]
+    """How one sensor sees a point of the map: one of the classes."""
+    dx = x - sensors[s, 2]
+    dy = y - sensors[s, 3]
+    local_x = sensors[s, 0] * dx + sensors[s, 1] * dy
+    local_y = sensors[s, 0] * dy - sensors[s, 1] * dx
+    beam = _beam_of(local_x, local_y, sensors, s)
+    a = _wrapped(beam, sensors, s)
+    b = _wrapped(beam + 1, sensors, s)
+    if a < 0 and b < 0:
+        return UNSEEN
+    distance = math.sqrt(local_x * local_x + local_y * local_y)
+    around = max(a, int(sensors[s, 6]))
+    within = beams[around, 3] - tolerance <= distance <= beams[around, 4] + tolerance
+    if within and _surface_distance(local_x, local_y, beam, beams, sensors, s, gap) <= tolerance * tolerance:
+        return SUPPORTED
+    if a < 0 or b < 0:
+        return UNSEEN
+    if distance < min(beams[a, 2], beams[b, 2]):
+        return CONTRADICTED
+    if 0.0 < distance - max(beams[a, 2], beams[b, 2]) < depth:
+        return SHADOWED
+    return UNSEEN
+
+
+@_compiled
+def _class_of(x, y, beams, sensors, tolerance, gap, depth):  # type: ignore[no-untyped-def]
+    """How all sensors together see a point: supported by one outweighs contradicted by another, and so on."""
+    seen = UNSEEN
+    for s in range(len(sensors)):
+        seen = min(seen, _seen_by(x, y, beams, sensors, s, tolerance, gap, depth))
+        if seen == SUPPORTED:
+            break
+    return seen
+
+
+@_compiled
+def classify(
+    points: FloatArray,
+    cosine: float,
+    sine: float,
+    x: float,
+    y: float,
+    beams: FloatArray,
+    sensors: FloatArray,
+    tolerance: float,
+    gap: float,
+    depth: float,
+) -> IntArray:
+    """The class of each point (m, 3) of another map, moved by a pose into the frame of the sensors."""
+    classes = np.empty(len(points), np.int64)
+    for k in range(len(points)):
+        px = cosine * points[k, 0] - sine * points[k, 1] + x
+        py = sine * points[k, 0] + cosine * points[k, 1] + y
+        classes[k] = _class_of(px, py, beams, sensors, tolerance, gap, depth)
+    return classes
+
+
+@_compiled
+def look(
+    sighting_1: Sighting, sighting_2: Sighting, poses: FloatArray, tolerance: float, gap: float, depth: float
+) -> FloatArray:
+    """For each ``T_1_2`` of poses (k, 3): metres of beam width in each class, (k, 4), both ways together."""
+    totals = np.zeros((len(poses), CLASSES))
+    for k in range(len(poses)):
+        cosine = math.cos(poses[k, 2])
+        sine = math.sin(poses[k, 2])
+        x = poses[k, 0]
+        y = poses[k, 1]
+        _add_classes(totals, k, sighting_2.points, cosine, sine, x, y, sighting_1, tolerance, gap, depth)
+        back_x = -cosine * x - sine * y
+        back_y = sine * x - cosine * y
+        _add_classes(totals, k, sighting_1.points, cosine, -sine, back_x, back_y, sighting_2, tolerance, gap, depth)
+    return totals
+
+
+@_compiled
+def _add_classes(totals, row, points, cosine, sine, x, y, seen, tolerance, gap, depth):  # type: ignore[no-untyped-def]
+    beams = seen.beams
+    sensors = seen.sensors
+    for q in range(len(points)):
+        px = cosine * points[q, 0] - sine * points[q, 1] + x
+        py = sine * points[q, 0] + cosine * points[q, 1] + y
+        totals[row, _class_of(px, py, beams, sensors, tolerance, gap, depth)] += points[q, 2]
+
+
+@_compiled
+def distinct(poses: FloatArray, order: IntArray, distance: float, angle: float, most: int) -> IntArray:
+    """The first ``most`` of ``order`` that are each farther than ``distance`` or ``angle`` from all before."""
+    kept = np.empty(min(most, len(order)), np.int64)
+    count = 0
+    for k in order:
+        if count == len(kept):
+            break
+        alone = True
+        for i in range(count):
+            other = poses[kept[i]]
+            dx = poses[k, 0] - other[0]
+            dy = poses[k, 1] - other[1]
+            turn = abs(poses[k, 2] - other[2]) % (2.0 * math.pi)
+            if dx * dx + dy * dy < distance * distance and min(turn, 2.0 * math.pi - turn) < angle:
+                alone = False
+                break
+        if alone:
+            kept[count] = k
+            count += 1
+    return kept[:count]
+
+
+# --- refinement: robust point-to-line least squares, both ways -----------------------------------
+
+
+@_compiled
+def _surface_line(x, y, beam, beams, sensors, s, gate, gap, line):  # type: ignore[no-untyped-def]
+    """The line of the surface nearest to a point of the sensor's frame: ``line`` = nx, ny, offset; its distance."""
+    nearest = gate
+    for step in range(-NEIGHBOURS, NEIGHBOURS + 1):
+        a = _wrapped(beam + step, sensors, s)
+        b = _wrapped(beam + step + 1, sensors, s)
+        if a < 0 or b < 0 or math.isnan(beams[a, 2]) or math.isnan(beams[b, 2]):
+            continue
+        ex = beams[b, 0] - beams[a, 0]
+        ey = beams[b, 1] - beams[a, 1]
+        squared = ex * ex + ey * ey
+        if squared == 0.0 or squared > gap * gap:
+            continue
+        dx = x - beams[a, 0]
+        dy = y - beams[a, 1]
+        share = (dx * ex + dy * ey) / squared
+        if share < -0.5 or share > 1.5:
+            continue
+        share = min(1.0, max(0.0, share))
+        distance = math.sqrt((dx - share * ex) ** 2 + (dy - share * ey) ** 2)
+        if distance < nearest:
+            nearest = distance
+            _line_through(beam + step, beams, sensors, s, gap, line)
+    return nearest
+
+
+@_compiled
+def _line_through(beam, beams, sensors, s, gap, line):  # type: ignore[no-untyped-def]
+    """The line through two neighbouring returns, over one more on either side where the surface goes on."""
+    a = _wrapped(beam, sensors, s)
+    b = _wrapped(beam + 1, sensors, s)
+    before = _wrapped(beam - 1, sensors, s)
+    after = _wrapped(beam + 2, sensors, s)
+    if before >= 0 and _near(beams, before, a, gap):
+        a = before
+    if after >= 0 and _near(beams, after, b, gap):
+        b = after
+    ex = beams[b, 0] - beams[a, 0]
+    ey = beams[b, 1] - beams[a, 1]
+    length = max(math.sqrt(ex * ex + ey * ey), 1e-12)
+    line[0] = -ey / length
+    line[1] = ex / length
+    line[2] = 0.5 * (line[0] * (beams[a, 0] + beams[b, 0]) + line[1] * (beams[a, 1] + beams[b, 1]))
+
+
+@_inlined
+def _near(beams, a, b, gap):  # type: ignore[no-untyped-def]
+    return (beams[a, 0] - beams[b, 0]) ** 2 + (beams[a, 1] - beams[b, 1]) ** 2 < gap * gap  # false for NaN
+
+
+@_compiled
+def _accumulate(points, moved, jacobians, beams, sensors, gate, gap, normal, rhs):  # type: ignore[no-untyped-def]
+    """Add the robust normal equations of points moved into the frame of some sensors; the sum of weights.
+
+    ``jacobians`` (m, 2, 3) are the derivatives of the moved points by x, y and theta of the pose.
+    """
+    line = np.empty(3)
+    total = 0.0
+    for k in range(len(points)):
+        for s in range(len(sensors)):
+            dx = moved[k, 0] - sensors[s, 2]
+            dy = moved[k, 1] - sensors[s, 3]
+            x = sensors[s, 0] * dx + sensors[s, 1] * dy
+            y = sensors[s, 0] * dy - sensors[s, 1] * dx
+            distance = _surface_line(x, y, _beam_of(x, y, sensors, s), beams, sensors, s, gate, gap, line)
+            if distance >= gate:
+                continue
+            residual = line[0] * x + line[1] * y - line[2]
+            weight = (1.0 - (distance / gate) ** 2) ** 2
+            nx = sensors[s, 0] * line[0] - sensors[s, 1] * line[1]
+            ny = sensors[s, 1] * line[0] + sensors[s, 0] * line[1]
+            total += weight
+            for i in range(3):
+                slope = nx * jacobians[k, 0, i] + ny * jacobians[k, 1, i]
+                rhs[i] -= weight * slope * residual
+                for j in range(3):
+                    normal[i, j] += weight * slope * (nx * jacobians[k, 0, j] + ny * jacobians[k, 1, j])
+            break
+    return total
+
+
+@_compiled
+def _normal_equations(sighting_1, sighting_2, pose, gate, gap, normal, rhs):  # type: ignore[no-untyped-def]
+    """Both ways: points of 2 against the surfaces of 1, and points of 1 against those of 2."""
+    cosine = math.cos(pose[2])
+    sine = math.sin(pose[2])
+    normal[:] = 0.0
+    rhs[:] = 0.0
+    total = 0.0
+    for way in range(2):
+        points = sighting_2.points if way == 0 else sighting_1.points
+        moved = np.empty((len(points), 2))
+        jacobians = np.empty((len(points), 2, 3))
+        for k in range(len(points)):
+            if way == 0:
+                moved[k, 0] = cosine * points[k, 0] - sine * points[k, 1] + pose[0]
+                moved[k, 1] = sine * points[k, 0] + cosine * points[k, 1] + pose[1]
+                jacobians[k] = np.array(((1.0, 0.0, pose[1] - moved[k, 1]), (0.0, 1.0, moved[k, 0] - pose[0])))
+            else:
+                dx = points[k, 0] - pose[0]
+                dy = points[k, 1] - pose[1]
+                moved[k, 0] = cosine * dx + sine * dy
+                moved[k, 1] = cosine * dy - sine * dx
+                jacobians[k] = np.array(((-cosine, -sine, moved[k, 1]), (sine, -cosine, -moved[k, 0])))
+        seen = sighting_1 if way == 0 else sighting_2
+        total += _accumulate(points, moved, jacobians, seen.beams, seen.sensors, gate, gap, normal, rhs)
+    return total
+
+
+@_compiled
+def refine(
+    sighting_1: Sighting,
+    sighting_2: Sighting,
+    poses: FloatArray,
+    steps: int,
+    first_gate: float,
+    last_gate: float,
+    gap: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Each ``T_1_2`` of poses (k, 3) after some steps of robust point-to-line least squares with a shrinking gate.
+
+    Returns the poses, and the normal matrices (k, 3, 3) of the last step: weighted sums over points, per metre
+    squared for x and y.
+    """
+    refined = poses.copy()
+    information = np.zeros((len(poses), 3, 3))
+    rhs = np.empty(3)
+    for k in range(len(poses)):
+        for step in range(steps):
+            gate = first_gate * (last_gate / first_gate) ** (step / max(1, steps - 1))
+            total = _normal_equations(sighting_1, sighting_2, refined[k], gate, gap, information[k], rhs)
+            if total < 3.0:
+                break
+            _step(information[k], rhs, refined[k])
+    return refined, information
+
+
+@_compiled
+def _step(normal, rhs, pose):  # type: ignore[no-untyped-def]
+    """One damped, bounded Gauss-Newton step."""
+    damped = normal.copy()
+    damping = 1e-5 * (normal[0, 0] + normal[1, 1]) + 1e-9
+    for i in range(3):
+        damped[i, i] += damping
+    delta = np.linalg.solve(damped, rhs)
+    length = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1])
+    shrink = min(1.0, _MOVE_STEP / max(length, 1e-12))
+    pose[0] += shrink * delta[0]
+    pose[1] += shrink * delta[1]
+    pose[2] += min(_TURN_STEP, max(-_TURN_STEP, delta[2]))

@@ -1,0 +1,93 @@
+"""Evidence -> accepted | review | rejected, with reasons; and the calibration of its confidence."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+from segmap.parameters import Parameters
+from segmap.visibility import Evidence
+
+__all__ = ["CALIBRATION", "Findings", "Verdict", "confidence", "judge_evidence", "judge_value"]
+
+
+class Verdict(StrEnum):
+    """What the program says of an integration; a person has the last word."""
+
+    ACCEPTED = "accepted"
+    REVIEW = "review"
+    REJECTED = "rejected"
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What speaks for and against the best candidate of a pair."""
+
+    score: float
+    """metres: support less conflict"""
+    gap: float
+    """metres: how much less the score of the nearest distinct rival is; the score itself where there is none"""
+    evidence: Evidence
+    weakest: float
+    """metres: standard deviation along the weakest direction"""
+
+
+CALIBRATION: dict[str, float] = {"intercept": -5.0, "score": 0.6, "gap": 0.8, "agreement": 3.0}
+"""Logistic weights of the confidence, fitted by ``benchmarks/calibrate.py``."""
+
+
+def confidence(findings: Findings) -> float:
+    """The calibrated probability, in 0..1, that the best candidate is right within 0.25 m and 5 degrees."""
+    features = features_of(findings)
+    logit = CALIBRATION["intercept"] + sum(CALIBRATION[name] * value for name, value in features.items())
+    return 1.0 / (1.0 + math.exp(-max(-60.0, min(60.0, logit))))
+
+
+def features_of(findings: Findings) -> dict[str, float]:
+    """What the confidence is computed from."""
+    return {
+        "score": min(findings.score, 20.0),
+        "gap": min(findings.gap, 10.0),
+        "agreement": findings.evidence.agreement,
+    }
+
+
+def judge_value(value: float, parameters: Parameters) -> tuple[Verdict, tuple[str, ...]]:
+    """The paper's rule: valid only above the threshold (IV-B, V-B)."""
+    threshold = parameters.value_threshold
+    if value > threshold:
+        return Verdict.ACCEPTED, (f"The value, {value:.2f} m, is above the threshold of {threshold:.2f} m.",)
+    return Verdict.REJECTED, (f"The best value, {value:.2f} m, is not above the threshold of {threshold:.2f} m.",)
+
+
+def judge_evidence(value: float, findings: Findings, parameters: Parameters) -> tuple[Verdict, tuple[str, ...]]:
+    """The verdict on evidence: enough confidence, and a value above the threshold too."""
+    sure = confidence(findings)
+    reasons = (_certainty(sure, parameters), *_grounds(findings, parameters))
+    verdict, value_reasons = judge_value(value, parameters)
+    if sure < parameters.confidence_review or (verdict is Verdict.REJECTED and sure < parameters.confidence_accept):
+        return Verdict.REJECTED, (*reasons, *value_reasons)
+    if sure >= parameters.confidence_accept and verdict is Verdict.ACCEPTED:
+        return Verdict.ACCEPTED, (*reasons, *value_reasons)
+    return Verdict.REVIEW, (*reasons, *value_reasons)
+
+
+def _certainty(sure: float, parameters: Parameters) -> str:
+    if sure >= parameters.confidence_accept:
+        return f"Confidence {sure:.3f}: at or above {parameters.confidence_accept:g}."
+    if sure >= parameters.confidence_review:
+        return f"Confidence {sure:.3f}: between {parameters.confidence_review:g} and {parameters.confidence_accept:g}."
+    return f"Confidence {sure:.3f}: below {parameters.confidence_review:g}."
+
+
+def _grounds(findings: Findings, parameters: Parameters) -> tuple[str, ...]:
+    """The evidence in words, the weightiest doubt first."""
+    seen = findings.evidence
+    against = seen.contradicted + seen.shadowed
+    grounds = [f"{seen.supported:.1f} m are seen by both, {against:.1f} m contradict, {seen.unseen:.1f} m are unseen."]
+    if findings.gap < 0.2 * max(findings.score, 1.0):
+        grounds.insert(0, f"A distinct rival scores only {findings.gap:.2f} m less: look at the rivals.")
+    if findings.weakest > parameters.rival_distance / 2.0:
+        grounds.append(f"Along its weakest direction the pose is known only to {findings.weakest:.2f} m.")
+    return tuple(grounds)

@@ -1,0 +1,137 @@
+"""Candidate -> line-of-sight support and conflict: what the beams of one map say of the points of the other.
+
+A scan is not only segments: each beam says that the space before its return is empty. Under a candidate,
+a return of one map is *supported* where the other map's sensors see a surface at it, *contradicted* where
+they see through it, *shadowed* where it lies close behind a surface they see, and *unseen* otherwise. Each
+return weighs as many metres as its beam is wide there, so that a near wall does not outvote the far end of
+a corridor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from segmap import _sight_kernels as kernels
+from segmap._sight_kernels import Sighting
+from segmap.parameters import Parameters
+from segmap.pose import FloatArray, IntArray, Pose2
+from segmap.segments import SegmentMap, Sight
+
+__all__ = ["Evidence", "Sighting", "classes", "evidence", "look", "score", "sighting", "thinned"]
+
+WIDEST = 0.5
+"""metres; no return weighs more"""
+SURFACE_GAP = 0.5
+"""metres; two neighbouring returns closer than this are taken as one surface"""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What lines of sight say of a candidate, in metres of wall as wide as the beams that met it."""
+
+    supported: float
+    contradicted: float
+    shadowed: float
+    """close behind a surface that the other map sees"""
+    unseen: float
+
+    @property
+    def agreement(self) -> float:
+        """Share of what both maps could judge that is supported, in 0..1; 0 where there is nothing to judge."""
+        judged = self.supported + self.contradicted + self.shadowed
+        return self.supported / judged if judged > 0.0 else 0.0
+
+    @property
+    def overlap(self) -> float:
+        """Share of all returns that are supported, in 0..1."""
+        total = self.supported + self.contradicted + self.shadowed + self.unseen
+        return self.supported / total if total > 0.0 else 0.0
+
+
+def sighting(segment_map: SegmentMap) -> Sighting | None:
+    """What the scans of a map saw, in arrays; None where the map knows of no scan."""
+    sights = [sight for sight in segment_map.sights if np.isfinite(sight.scan.ranges).any()]
+    if not sights:
+        return None
+    points = np.concatenate([_points(sight) for sight in sights])
+    beams = np.concatenate([_beams(sight) for sight in sights])
+    starts = np.cumsum([0] + [len(sight.scan) for sight in sights])
+    sensors = np.array([_sensor(sight, start) for sight, start in zip(sights, starts, strict=False)])
+    return Sighting(points, beams, sensors)
+
+
+def _points(sight: Sight) -> FloatArray:
+    points, beams = sight.scan.returns()
+    widths = np.minimum(sight.scan.ranges[beams] * abs(sight.scan.angle_step), WIDEST)
+    return np.column_stack((sight.T_map_sensor @ points, widths))
+
+
+def _beams(sight: Sight) -> FloatArray:
+    ranges, angles = sight.scan.ranges, sight.scan.angles
+    around = np.stack([_neighbour(ranges, step, sight.scan.all_round) for step in (-1, 0, 1, 2)])
+    return np.column_stack(
+        (
+            ranges * np.cos(angles),
+            ranges * np.sin(angles),
+            ranges,
+            np.fmin.reduce(around, axis=0, initial=np.inf),
+            np.fmax.reduce(around, axis=0, initial=-np.inf),
+        )
+    )
+
+
+def _neighbour(ranges: FloatArray, step: int, ring: bool) -> FloatArray:
+    """The range of the beam ``step`` beams on, NaN beyond the last one."""
+    beams = np.arange(len(ranges)) + step
+    shifted = ranges[beams % len(ranges)]
+    return shifted if ring else np.where((beams >= 0) & (beams < len(ranges)), shifted, np.nan)
+
+
+def _sensor(sight: Sight, start: int) -> tuple[float, ...]:
+    T, scan = sight.T_map_sensor, sight.scan
+    return np.cos(T.theta), np.sin(T.theta), T.x, T.y, scan.first_angle, scan.angle_step, float(start), len(scan)
+
+
+def thinned(seen: Sighting, most: int) -> Sighting:
+    """The same sensors with at most about ``most`` points, evenly taken; each stands for those left out."""
+    stride = max(1, round(len(seen.points) / most))
+    if stride == 1:
+        return seen
+    points = seen.points[stride // 2 :: stride].copy()
+    points[:, 2] *= stride
+    return seen._replace(points=points)
+
+
+def look(seen_1: Sighting, seen_2: Sighting, poses: FloatArray, parameters: Parameters) -> FloatArray:
+    """For each ``T_1_2`` of poses (k, 3): metres supported, contradicted, shadowed and unseen, (k, 4)."""
+    totals: FloatArray = kernels.look(
+        seen_1, seen_2, poses, parameters.sight_tolerance, SURFACE_GAP, parameters.shadow_depth
+    )
+    return totals
+
+
+def score(totals: FloatArray, parameters: Parameters) -> FloatArray:
+    """What candidates are ranked by, metres: support less what speaks against it; of (k, 4) totals, (k,)."""
+    weights = (1.0, -parameters.conflict_weight, -parameters.shadow_weight, -parameters.unseen_weight)
+    return totals @ np.array(weights)
+
+
+def evidence(totals: FloatArray) -> Evidence:
+    """One row of totals, by name."""
+    return Evidence(*(float(total) for total in totals))
+
+
+def classes(seen_1: Sighting, seen_2: Sighting, T_1_2: Pose2, parameters: Parameters) -> tuple[IntArray, IntArray]:
+    """The class of each point of map 1 and of each of map 2 under a candidate, for drawing."""
+    options = parameters.sight_tolerance, SURFACE_GAP, parameters.shadow_depth
+    return _classified(seen_1, seen_2, T_1_2.inverse(), options), _classified(seen_2, seen_1, T_1_2, options)
+
+
+def _classified(seen: Sighting, by: Sighting, T_by_seen: Pose2, options: tuple[float, float, float]) -> IntArray:
+    cosine, sine = float(np.cos(T_by_seen.theta)), float(np.sin(T_by_seen.theta))
+    found: IntArray = kernels.classify(
+        seen.points, cosine, sine, T_by_seen.x, T_by_seen.y, by.beams, by.sensors, *options
+    )
+    return found
