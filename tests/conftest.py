@@ -15,6 +15,15 @@ from hypothesis import settings
 settings.register_profile("segmap", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("segmap")
 
+CHROMIUMS = ("chromium", "chromium-browser", "google-chrome")
+ARGUMENTS = (
+    "--no-sandbox",
+    "--disable-dev-shm-usage",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+)
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 
@@ -38,13 +47,14 @@ def benchmarks() -> Path:
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    """Chromium, driven by playwright: the system's, or playwright's own; skips without either."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+def chromium() -> Iterator[Any]:
+    """The one chromium of all tests: SEGMAP_CHROMIUM, the system's, or playwright's own; skips without any."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install playwright")
     with sync_api.sync_playwright() as playwright:
-        found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-        if not (found or Path(playwright.chromium.executable_path).exists()):
-            pytest.skip("there is no chromium; run: playwright install chromium")
-        chromium = playwright.chromium.launch(executable_path=found, args=["--no-sandbox", "--disable-dev-shm-usage"])
-        yield chromium
-        chromium.close()
+        named = [os.environ.get("SEGMAP_CHROMIUM"), *map(shutil.which, CHROMIUMS), playwright.chromium.executable_path]
+        path = next((name for name in named if name and Path(name).is_file()), None)
+        if path is None:
+            pytest.skip("there is no chromium: install it, or set SEGMAP_CHROMIUM to where it is")
+        browser = playwright.chromium.launch(executable_path=path, args=list(ARGUMENTS))
+        yield browser
+        browser.close()

@@ -19,14 +19,6 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Frame, Locator, Page
 
 ROOT = Path(__file__).resolve().parents[2]
-CHROMIUM = "/usr/bin/chromium"
-ARGUMENTS = (
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-)
 SERVE = (
     "import sys; from pathlib import Path; from app.server import serve; "
     "serve(port=int(sys.argv[1]), workspace=Path(sys.argv[2]))"
@@ -185,19 +177,6 @@ class Desk:
         if note.count():
             self.scene.locator("button.mantine-Notification-closeButton").first.evaluate("button => button.click()")
             note.wait_for(state="detached")
-
-
-@pytest.fixture(scope="session")
-def chromium() -> Iterator[Browser]:
-    """Chromium; skips where there is none."""
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install playwright")
-    path = Path(os.environ.get("SEGMAP_CHROMIUM", CHROMIUM))
-    if not path.is_file():
-        pytest.skip(f"there is no chromium at {path}; set SEGMAP_CHROMIUM to where it is")
-    with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(path), args=list(ARGUMENTS))
-        yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="session")

@@ -128,10 +128,10 @@ def test_too_large(part):
 
 
 @pytest.mark.browser
-def test_in_a_browser(browser, corner, tmp_path):
+def test_in_a_browser(chromium, corner, tmp_path):
     """A browser draws the corner as it is: foot below arm, ink where a line is, paper where none is."""
     (tmp_path / "map.svg").write_bytes(export_map([corner], "svg", {"title": "A corner"}))
-    page = browser.new_page(viewport={"width": 1000, "height": 750})
+    page = chromium.new_page(viewport={"width": 1000, "height": 750})
     page.goto((tmp_path / "map.svg").as_uri())
     foot, _, arm = (line.bounding_box() for line in page.locator("line").all())
     picture = imageio.v3.imread(page.screenshot())[..., :3].min(axis=2)
