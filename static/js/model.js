@@ -3,10 +3,11 @@
 import { get, post } from "./api.js";
 
 const MATCHING_PAUSE = 700;
+const MERGING_PAUSE = 500;
 const REDRAW_PAUSE = 250;
 const DECISION_PAUSE = 60;
 
-/** Tells "info", "rows", "progress", "match", "parameters" and "trouble" as events. */
+/** Tells "info", "rows", "progress", "match", "map", "parameters" and "trouble" as events. */
 export class Project extends EventTarget {
   constructor(id) {
     super();
@@ -70,7 +71,7 @@ export class Project extends EventTarget {
     else if (event.type === "progress") this.#progressed(event);
     else if (event.type === "parameters") this.refresh(), this.tell("parameters");
     else if (event.type === "decision") this.#decided(event);
-    else if (event.type === "log") this.refresh();
+    else if (event.type === "hello" || event.type === "log") this.refresh();
     else if (event.type === "map") this.refreshInfo(), this.tell("map");
     else if (event.type === "error") this.tell("trouble", new Error(event.message));
   }
@@ -93,6 +94,7 @@ export class Project extends EventTarget {
     this.info = await get(this.url);
     this.tell("info");
     this.tell("progress");
+    if (this.info.merging) this.refreshInfo(MERGING_PAUSE);
   }
 
   async #loadRows() {
