@@ -22,7 +22,7 @@ from segmap.pose import Pose2
 from segmap.scans import LaserLog
 from segmap.segments import extract
 
-__all__ = ["KindScore", "LogScore", "Outcome", "Pair", "PairSet", "run_pairs", "score"]
+__all__ = ["KindScore", "LogScore", "Outcome", "Pair", "PairSet", "is_right", "run_pairs", "score"]
 
 RIGHT_DISTANCE = 0.25
 """metres"""
@@ -126,7 +126,7 @@ def run_pairs(
     pair_set: PairSet,
     log: LaserLog,
     parameters: Parameters | None = None,
-    heuristic: str = "all",
+    heuristic: str | None = None,
     mode: str = "paper",
     *,
     progress: Callable[[int, int], None] | None = None,
@@ -144,7 +144,7 @@ def run_pairs(
     return outcomes
 
 
-def _outcome(pair: Pair, log: LaserLog, parameters: Parameters, heuristic: str, mode: str) -> Outcome:
+def _outcome(pair: Pair, log: LaserLog, parameters: Parameters, heuristic: str | None, mode: str) -> Outcome:
     scan_1, scan_2 = log.scan(pair.i), log.scan(pair.j)
     started = time.perf_counter()
     match = match_maps(extract(scan_1, parameters), extract(scan_2, parameters), parameters, heuristic, mode)

@@ -30,6 +30,7 @@ __all__ = [
     "Integration",
     "Match",
     "Verdict",
+    "findings_of",
     "heuristics",
     "integrate",
     "match_maps",
@@ -347,6 +348,11 @@ def _findings(ranked: tuple[Candidate, ...]) -> Findings | None:
         return None
     rival = max((c.score for c in ranked[1:] if c.score is not None), default=0.0)
     return Findings(first.score, first.score - max(rival, 0.0), first.evidence, first.uncertainty.weakest)
+
+
+def findings_of(match: Match) -> Findings | None:
+    """What speaks for and against the best candidate of a match; None without evidence."""
+    return _findings(match.ranked)
 
 
 def _confidence(ranked: tuple[Candidate, ...]) -> float:
