@@ -14,7 +14,7 @@ from numba import njit
 
 from segmap.pose import FloatArray, IntArray
 
-__all__ = ["equal_angles", "evaluate", "first_of_each", "matching_pairs", "superimpose"]
+__all__ = ["closest_edges", "equal_angles", "evaluate", "first_of_each", "matching_pairs", "superimpose"]
 
 TOUCH = 1e-9
 """metres; a segment whose extreme is this near to a line touches it, whatever the rounding"""
@@ -277,3 +277,66 @@ def matching_pairs(
         indices[k, 0] = pairs[k][0]
         indices[k, 1] = pairs[k][1]
     return indices, np.array(values)
+
+
+# --- fusion (Algorithm 5) -------------------------------------------------------------------------
+
+
+@_inlined
+def _squared_distance(x, y, x1, y1, x2, y2):  # type: ignore[no-untyped-def]
+    """Squared distance of a point from a segment, which may be a point."""
+    ex = x2 - x1
+    ey = y2 - y1
+    squared = ex * ex + ey * ey
+    share = 0.0 if squared == 0.0 else min(1.0, max(0.0, ((x - x1) * ex + (y - y1) * ey) / squared))
+    dx = x - x1 - share * ex
+    dy = y - y1 - share * ey
+    return dx * dx + dy * dy
+
+
+@_compiled
+def closest_edges(segments: FloatArray, vertices: FloatArray) -> tuple[FloatArray, IntArray]:
+    """For each segment (n, 4), the distance to its closest edge of a polyline (k, 2), and that edge, (n,) each."""
+    distances = np.empty(len(segments))
+    edges = np.empty(len(segments), np.int64)
+    for i in range(len(segments)):
+        nearest = np.inf
+        for k in range(len(vertices) - 1):
+            x1, y1, x2, y2 = vertices[k, 0], vertices[k, 1], vertices[k + 1, 0], vertices[k + 1, 1]
+            start = _squared_distance(segments[i, 0], segments[i, 1], x1, y1, x2, y2)
+            end = _squared_distance(segments[i, 2], segments[i, 3], x1, y1, x2, y2)
+            if max(start, end) < nearest:
+                nearest = max(start, end)
+                edges[i] = k
+        distances[i] = math.sqrt(nearest)
+    return distances, edges
+
+
+@_compiled
+def middles_within(edges: FloatArray, segments: FloatArray, tolerance: float) -> IntArray:
+    """Whether the middle of each edge (k, 4) is within a tolerance of each segment (n, 4), as (n, k) of 0 and 1."""
+    near = np.zeros((len(segments), len(edges)), np.int64)
+    for k in range(len(edges)):
+        x = 0.5 * (edges[k, 0] + edges[k, 2])
+        y = 0.5 * (edges[k, 1] + edges[k, 3])
+        for i in range(len(segments)):
+            x1, y1, x2, y2 = segments[i, 0], segments[i, 1], segments[i, 2], segments[i, 3]
+            near[i, k] = _squared_distance(x, y, x1, y1, x2, y2) <= tolerance * tolerance
+    return near
+
+
+@_compiled
+def farthest_extremes(points: FloatArray) -> tuple[int, int]:
+    """The two of some points (n, 2) that are farthest apart; the first such pair where several are."""
+    first = 0
+    second = 0
+    farthest = -1.0
+    for i in range(len(points)):
+        for j in range(i + 1, len(points)):
+            dx = points[i, 0] - points[j, 0]
+            dy = points[i, 1] - points[j, 1]
+            if dx * dx + dy * dy > farthest:
+                farthest = dx * dx + dy * dy
+                first = i
+                second = j
+    return first, second

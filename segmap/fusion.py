@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.distance import pdist
 
+from segmap import _kernels
 from segmap.chains import MatchingChain
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
@@ -29,7 +29,7 @@ class Polyline:
     insertions: int
     """n of the last P_n (Algorithm 5, line 8)"""
     finished: bool
-    """False where the plain variant met its bound before every segment was within fusion_tolerance"""
+    """False where the plain variant met its bound and the greedy polyline was taken instead"""
 
     @property
     def edges(self) -> FloatArray:
@@ -81,33 +81,39 @@ def _unmatched(segment_map: SegmentMap, matched: list[int]) -> SegmentMap:
 def polyline(members: SegmentMap, parameters: Parameters) -> Polyline:
     """P_0, P_1, ... until every segment of a chain is within ``fusion_tolerance`` of its closest edge.
 
-    ``greedy`` inserts each segment at most once; ``plain`` may insert one again, at most
-    ``fusion_bound`` times the number of segments in all.
+    ``greedy`` inserts each segment at most once; ``plain`` may insert one again, at most ``fusion_bound``
+    times the number of segments in all. Where it meets that bound, the greedy polyline is taken instead and
+    reported as unfinished: what goes round in circles only grows.
     """
+    if parameters.fusion_variant == "plain":
+        line = _grown(members, parameters, again=True)
+        if line.finished:
+            return line
+    line = _grown(members, parameters, again=False)
+    return replace(line, finished=parameters.fusion_variant == "greedy")
+
+
+def _grown(members: SegmentMap, parameters: Parameters, again: bool) -> Polyline:
+    """The while loop of Algorithm 5, lines 7 to 11."""
     vertices, directed = _first_edge(members)
     segments = members.coordinates
     waiting = np.ones(len(segments), bool)
-    plain = parameters.fusion_variant == "plain"
-    bound = parameters.fusion_bound * len(segments) if plain else len(segments)
-    insertions = 0
-    while insertions < bound and waiting.any():
+    bound = len(segments) * (parameters.fusion_bound if again else 1)
+    for insertions in range(bound + 1):
         distances, edges = closest_edges(segments, vertices)
         s = int(np.argmax(np.where(waiting, distances, -1.0)))
-        if distances[s] <= parameters.fusion_tolerance:
-            break
-        insertions += 1
-        waiting[s] = plain
-        vertices = _inserted(vertices, int(edges[s]), segments[s], parameters.point_distance_tolerance)
-    finished = not plain or bool((closest_edges(segments, vertices)[0] <= parameters.fusion_tolerance).all())
-    return Polyline(vertices, directed, insertions, finished)
+        if not waiting[s] or distances[s] <= parameters.fusion_tolerance:
+            return Polyline(vertices, directed, insertions, finished=True)
+        if insertions < bound:
+            waiting[s] = again
+            vertices = _inserted(vertices, int(edges[s]), segments[s], parameters.point_distance_tolerance)
+    return Polyline(vertices, directed, bound, finished=False)
 
 
 def _first_edge(members: SegmentMap) -> tuple[FloatArray, bool]:
     """P_0 between the two farthest extremes, directed as most of the length is; and whether it is directed."""
     extremes = members.coordinates.reshape(-1, 2)
-    first, second = np.triu_indices(len(extremes), k=1)
-    farthest = int(np.argmax(pdist(extremes)))
-    edge = extremes[[first[farthest], second[farthest]]]
+    edge = extremes[list(_kernels.farthest_extremes(extremes))]
     along = (members.coordinates[:, 2:] - members.coordinates[:, :2]) @ (edge[1] - edge[0])
     lengths = members.lengths
     ahead = lengths[members.directed & (along >= 0.0)].sum()
@@ -122,14 +128,8 @@ def closest_edges(segments: FloatArray, vertices: FloatArray) -> tuple[FloatArra
 
     The distance from an edge is the larger of the distances of the two extremes.
     """
-    start, along = vertices[:-1], np.diff(vertices, axis=0)
-    squared = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
-    offset = segments.reshape(-1, 2)[:, None] - start
-    share = np.clip((offset * along).sum(axis=2) / squared, 0.0, 1.0)
-    apart = offset - share[..., None] * along
-    distances = np.hypot(apart[..., 0], apart[..., 1]).reshape(len(segments), 2, -1).max(axis=1)
-    edges = np.argmin(distances, axis=1)
-    return distances[np.arange(len(segments)), edges], edges
+    distances, edges = _kernels.closest_edges(segments, vertices)
+    return distances, edges
 
 
 def _inserted(vertices: FloatArray, edge: int, segment: FloatArray, tolerance: float) -> FloatArray:
@@ -154,23 +154,19 @@ def _distance(p: FloatArray, q: FloatArray) -> float:
 
 
 def _as_map(line: Polyline, members: SegmentMap, parameters: Parameters) -> SegmentMap:
-    """The edges of a polyline as a map, without connectors that would claim a wall nobody saw."""
+    """The edges of a polyline as a map, without connectors that would claim a wall nobody saw.
+
+    An edge stands for a segment when it is its closest one, or has its middle within the tolerance of it.
+    """
     edges = line.edges
-    owners = _stands_for(edges, members.coordinates, line.vertices, parameters.fusion_tolerance)
+    _, closest = closest_edges(members.coordinates, line.vertices)
+    owners = _kernels.middles_within(edges, members.coordinates, parameters.fusion_tolerance)
+    owners[np.arange(len(members)), closest] = 1
     sources = tuple(_united(members, np.flatnonzero(column)) for column in owners.T)
     whole = SegmentMap(edges, Order.NONE, np.full(len(edges), line.directed), sources)
     if parameters.max_connector is None:
         return whole
     return whole.take(np.flatnonzero(owners.any(axis=0) | (whole.lengths <= parameters.max_connector)))
-
-
-def _stands_for(edges: FloatArray, segments: FloatArray, vertices: FloatArray, tolerance: float) -> IntArray:
-    """Whether an edge is a segment's closest one, or has its middle within the tolerance of the segment; (n, k)."""
-    _, closest = closest_edges(segments, vertices)
-    middles = (edges[:, :2] + edges[:, 2:]) / 2.0
-    as_points = np.concatenate((middles, middles), axis=1)
-    near = np.stack([closest_edges(as_points, s.reshape(2, 2))[0] <= tolerance for s in segments])
-    return near | (closest[:, None] == np.arange(len(edges)))
 
 
 def _united(members: SegmentMap, rows: IntArray) -> tuple[Source, ...]:

@@ -18,18 +18,20 @@ from segmap.parameters import Parameters
 from segmap.pose import FloatArray, Pose2
 from segmap.refinement import Uncertainty, uncertainty
 from segmap.segments import SegmentMap
-from segmap.verdict import Findings, Verdict, confidence, judge_evidence, judge_value
+from segmap.verdict import Findings, Verdict, confidence, judge
 from segmap.verification import Verified, verify
 from segmap.visibility import Evidence, evidence, sighting
 
 __all__ = [
     "AUTOMATIC",
     "DEFAULT_HEURISTIC",
+    "DEFAULT_PRESET",
     "MODES",
     "Candidate",
     "Integration",
     "Match",
     "Verdict",
+    "chosen_heuristic",
     "findings_of",
     "heuristics",
     "integrate",
@@ -44,11 +46,27 @@ STAGES = ("extremes", "all")
 """what ``automatic`` tries in turn"""
 DEFAULT_HEURISTIC = {"paper": "all", "verified": AUTOMATIC}
 """the heuristic of each mode where none is asked for"""
+DEFAULT_PRESET = {"paper": "default", "verified": "verified"}
+"""the preset each mode's parameters start from"""
 
 
 def heuristics(mode: str) -> tuple[str, ...]:
     """The heuristics of a mode: the paper's four, or those and what goes beyond."""
     return PAPER_HEURISTICS if mode == "paper" else (AUTOMATIC, *HEURISTICS)
+
+
+def chosen_heuristic(mode: str, name: str | None = None) -> str:
+    """The heuristic of this name, or the mode's default.
+
+    Raises:
+        ParameterError: there is no such mode, or no such heuristic in it.
+    """
+    if mode not in MODES:
+        raise ParameterError(f"There is no mode {mode[:80]!r}. Modes are: {', '.join(MODES)}.")
+    if name is not None and name not in heuristics(mode):
+        known = ", ".join(heuristics(mode))
+        raise ParameterError(f"There is no heuristic {name[:80]!r} in {mode} mode. Heuristics are: {known}.")
+    return name or DEFAULT_HEURISTIC[mode]
 
 
 @dataclass(frozen=True)
@@ -189,9 +207,7 @@ def match_maps(
 
     Raises: as :func:`integrate`.
     """
-    if mode not in MODES:
-        raise ParameterError(f"There is no mode {mode!r}. Modes are: {', '.join(MODES)}.")
-    task = _Task(map_1, map_2, parameters or Parameters(), heuristic or DEFAULT_HEURISTIC[mode], workers, check)
+    task = _Task(map_1, map_2, parameters or Parameters(), chosen_heuristic(mode, heuristic), workers, check)
     started = time.perf_counter()
     found = _verified(task) if mode == "verified" else _as_the_paper(task)
     verdict, reasons = _verdict(found, task)
@@ -334,11 +350,7 @@ def _verdict(found: _Found, task: _Task) -> tuple[Verdict, tuple[str, ...]]:
 
 
 def _judgement(ranked: tuple[Candidate, ...], parameters: Parameters) -> tuple[Verdict, tuple[str, ...]]:
-    """By evidence where there is any, by value alone otherwise."""
-    findings = _findings(ranked)
-    if findings is None:
-        return judge_value(ranked[0].value, parameters)
-    return judge_evidence(ranked[0].value, findings, parameters)
+    return judge(ranked[0].value, _findings(ranked), parameters)
 
 
 def _findings(ranked: tuple[Candidate, ...]) -> Findings | None:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -36,8 +37,7 @@ class Order(StrEnum):
     """a partial map"""
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Source:
+class Source(NamedTuple):
     """A segment of a scan, as the origin of a segment of a map."""
 
     log: int

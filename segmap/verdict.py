@@ -9,7 +9,7 @@ from enum import StrEnum
 from segmap.parameters import Parameters
 from segmap.visibility import Evidence
 
-__all__ = ["CALIBRATION", "Findings", "Verdict", "confidence", "features", "judge_evidence", "judge_value"]
+__all__ = ["CALIBRATION", "Findings", "Verdict", "confidence", "features", "judge", "judge_evidence", "judge_value"]
 
 
 class Verdict(StrEnum):
@@ -60,6 +60,11 @@ def features(findings: Findings) -> dict[str, float]:
         "agreement": findings.evidence.agreement,
         "overlap": findings.evidence.overlap,
     }
+
+
+def judge(value: float, findings: Findings | None, parameters: Parameters) -> tuple[Verdict, tuple[str, ...]]:
+    """By evidence where there is any, by value alone otherwise."""
+    return judge_value(value, parameters) if findings is None else judge_evidence(value, findings, parameters)
 
 
 def judge_value(value: float, parameters: Parameters) -> tuple[Verdict, tuple[str, ...]]:

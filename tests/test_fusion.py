@@ -8,10 +8,11 @@ import real_pairs
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
 from worlds import maps, poses, room
 
 from segmap.chains import MatchingChain, matching_chains
-from segmap.fusion import fuse, polyline
+from segmap.fusion import closest_edges, fuse, polyline
 from segmap.parameters import Parameters, preset
 from segmap.pose import Pose2
 from segmap.segments import Order, SegmentMap, Source, extract
@@ -60,6 +61,19 @@ def test_chains_are_the_components_of_matching(map_1, map_2, T):
                 break
     ours = [{("1", i) for i in chain.first} | {("2", j) for j in chain.second} for chain in chains]
     assert sorted(map(sorted, ours)) == sorted(map(sorted, groups))
+
+
+@given(maps(most=6), npst.arrays(float, st.tuples(st.integers(2, 6), st.just(2)), elements=st.integers(-5, 5)))
+@loose
+def test_the_closest_edge_is_the_one_a_foreign_ruler_finds(members, vertices):
+    """Distance of the farther extreme from each edge, by shapely, edge by edge."""
+    distances, edges = closest_edges(members.coordinates, vertices)
+    if len(members):
+        points = shapely.points(members.coordinates.reshape(-1, 2, 2))
+        lines = [shapely.linestrings(edge) for edge in np.stack((vertices[:-1], vertices[1:]), axis=1)]
+        expected = np.stack([shapely.distance(points, line).max(axis=1) for line in lines])
+        assert distances == pytest.approx(expected.min(axis=0), abs=1e-9)
+        assert expected[edges, np.arange(len(edges))] == pytest.approx(distances, abs=1e-9)
 
 
 # --- fusing a map with itself ---------------------------------------------------------------------
