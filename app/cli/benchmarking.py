@@ -8,11 +8,10 @@ from typing import Annotated
 
 import typer
 
-from app.cli.options import DEFAULT_HEURISTIC, DEFAULT_MODE, Heuristic, Json, Mode, Preset, Setting, parameters_of, read
+from app.cli.options import DEFAULT_MODE, Heuristic, Json, Method, Mode, Preset, Setting, method_of, read
 from app.cli.output import print_json, print_table, progress
 from segmap.benchmark import LogScore, PairSet, run_pairs, score
 from segmap.errors import LogError
-from segmap.parameters import Parameters
 
 __all__ = ["benchmark"]
 
@@ -32,25 +31,26 @@ def pairs(
     ],
     logs: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the logs the pairs name.", show_default=False)],
     mode: Mode = DEFAULT_MODE,
-    heuristic: Heuristic = DEFAULT_HEURISTIC,
-    preset: Preset = "default",
+    heuristic: Heuristic = None,
+    preset: Preset = None,
     settings: Setting = None,
     as_json: Json = False,
 ) -> None:
     """Integrate pairs of scans by their ranges alone: right within 0.25 m and 5 degrees of the truth."""
-    parameters = parameters_of(preset, settings)
-    scores = [_score(file, logs, parameters, heuristic, mode) for file in files]
+    method = method_of(mode, heuristic, preset, settings)
+    scores = [_score(file, logs, method) for file in files]
     if as_json:
         print_json({"logs": [asdict(one) for one in scores]})
     else:
-        _print(scores, f"mode {mode}, heuristic {heuristic}")
+        _print(scores, f"mode {method.mode}, heuristic {method.heuristic}")
 
 
-def _score(file: Path, logs: Path, parameters: Parameters, heuristic: str, mode: str) -> LogScore:
+def _score(file: Path, logs: Path, method: Method) -> LogScore:
     pair_set = PairSet.from_json(_text(file), file.name)
     log = read(logs / pair_set.log)
     with progress(pair_set.log) as tell:
-        return score(pair_set.log, run_pairs(pair_set, log, parameters, heuristic, mode, progress=tell))
+        outcomes = run_pairs(pair_set, log, method.parameters, method.heuristic, method.mode, progress=tell)
+    return score(pair_set.log, outcomes)
 
 
 def _text(file: Path) -> bytes:

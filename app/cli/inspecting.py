@@ -70,7 +70,7 @@ def segments(
     log: Log,
     scan: Annotated[int, typer.Option(metavar="I", help="Index of the scan, from 0.", show_default=False)],
     as_json: Json = False,
-    preset: Preset = "default",
+    preset: Preset = None,
     settings: Setting = None,
 ) -> None:
     """Print the line segments of a scan, in beam order, metres, in the sensor's frame."""

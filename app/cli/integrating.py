@@ -7,7 +7,6 @@ from typing import Annotated, Any
 import typer
 
 from app.cli.options import (
-    DEFAULT_HEURISTIC,
     DEFAULT_MODE,
     Heuristic,
     Json,
@@ -15,7 +14,7 @@ from app.cli.options import (
     Mode,
     Preset,
     Setting,
-    parameters_of,
+    method_of,
     read,
 )
 from app.cli.output import pose_json, print_facts, print_json, show_pose
@@ -30,15 +29,15 @@ def integrate(
     first: Annotated[int, typer.Argument(metavar="I", help="Index of the first scan, from 0.", show_default=False)],
     second: Annotated[int, typer.Argument(metavar="J", help="Index of the second scan.", show_default=False)],
     mode: Mode = DEFAULT_MODE,
-    heuristic: Heuristic = DEFAULT_HEURISTIC,
-    preset: Preset = "default",
+    heuristic: Heuristic = None,
+    preset: Preset = None,
     settings: Setting = None,
     as_json: Json = False,
 ) -> None:
     """Find the pose of scan J in the frame of scan I, from their segments alone."""
-    laser_log, parameters = read(log), parameters_of(preset, settings)
-    map_1, map_2 = (extract(laser_log.scan(index), parameters, index=index) for index in (first, second))
-    match = match_maps(map_1, map_2, parameters, heuristic, mode)
+    laser_log, method = read(log), method_of(mode, heuristic, preset, settings)
+    map_1, map_2 = (extract(laser_log.scan(index), method.parameters, index=index) for index in (first, second))
+    match = match_maps(map_1, map_2, method.parameters, method.heuristic, method.mode)
     if as_json:
         print_json({"log": laser_log.name, "scans": [first, second], **_document(match)})
     else:
@@ -55,6 +54,7 @@ def _document(match: Match) -> dict[str, Any]:
         "candidates": match.candidates,
         **draws,
         "discarded": match.discarded,
+        "confidence": match.confidence,
         "verdict": str(match.verdict),
         "reasons": list(match.reasons),
         "chains": [[list(pair[:2]) for pair in chain.pairs] for chain in match.chains],
@@ -70,6 +70,7 @@ def _facts(match: Match, first: int, second: int) -> dict[str, object]:
         "reasons": " ".join(match.reasons),
         f"pose of {second} in {first}": show_pose(match.T_1_2),
         "value": f"{match.value:.3f} m",
+        **({} if match.confidence is None else {"confidence": f"{match.confidence:.1%}"}),
         "chains": f"{len(match.chains)}, of {sum(len(chain.pairs) for chain in match.chains)} pairs of segments",
         "candidates": f"{match.candidates}{draws}, {match.discarded} discarded ({match.mode}, {match.heuristic})",
         "segments": " and ".join(map(str, match.segments)),

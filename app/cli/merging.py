@@ -11,15 +11,15 @@ from typing import Annotated, Any
 import typer
 
 from app.cli.options import (
-    DEFAULT_HEURISTIC,
     DEFAULT_MODE,
     Heuristic,
     Json,
+    Method,
     Mode,
     Preset,
     Setting,
+    method_of,
     one_of,
-    parameters_of,
     read,
 )
 from app.cli.output import pose_json, print_json, print_table, progress
@@ -30,7 +30,6 @@ from segmap.export import write_map
 from segmap.integration import Match, Verdict
 from segmap.merging import METHODS, Component, Merge, map_hash
 from segmap.merging import merge as merge_maps
-from segmap.parameters import Parameters
 from segmap.scans import LaserLog, ScanId
 from segmap.segments import SegmentMap, extract
 
@@ -40,7 +39,7 @@ Logs = Annotated[
     list[Path],
     typer.Argument(metavar="LOGS...", help="Laser logs, each in the order it was driven.", show_default=False),
 ]
-Method = Annotated[str, typer.Option(metavar=one_of(METHODS), help="How a sequence of scans is merged.")]
+MergingMethod = Annotated[str, typer.Option(metavar=one_of(METHODS), help="How a sequence of scans is merged.")]
 Out = Annotated[
     list[Path] | None,
     typer.Option(metavar="FILE.EXT", help="Write the map, in the format the suffix says; can be given several times."),
@@ -56,13 +55,13 @@ Project = Annotated[
 
 def merge(
     logs: Logs,
-    method: Method = METHODS[-1],
+    method: MergingMethod = METHODS[-1],
     out: Out = None,
     trajectory: Trajectory = None,
     project: Project = None,
     mode: Mode = DEFAULT_MODE,
-    heuristic: Heuristic = DEFAULT_HEURISTIC,
-    preset: Preset = "default",
+    heuristic: Heuristic = None,
+    preset: Preset = None,
     settings: Setting = None,
     as_json: Json = False,
 ) -> None:
@@ -70,17 +69,17 @@ def merge(
 
     What cannot be integrated begins a new component, with a frame of its own: nothing is placed without evidence.
     """
-    parameters = parameters_of(preset, settings)
+    by = method_of(mode, heuristic, preset, settings)
     _check_places(out or [], project)
     laser_logs = [read(path) for path in logs]
-    merged = _merged(laser_logs, parameters, heuristic, mode, method)
+    merged = _merged(laser_logs, by, method)
     for path in out or []:
         write_map(merged.components, path, None, merged.about, list(map(str, merged.accepted)))
     if trajectory is not None:
         write_trajectory(trajectory, merged.components, laser_logs)
     if project is not None:
         sources = list(zip(logs, laser_logs, strict=True))
-        new_project(project, merged.title, sources, parameters, heuristic, mode, merged.accepted)
+        new_project(project, merged.title, sources, by, merged.accepted)
     _report(merged, as_json)
 
 
@@ -127,14 +126,14 @@ class _Merged:
         return described(self.title, self.hash)
 
 
-def _merged(logs: Sequence[LaserLog], parameters: Parameters, heuristic: str, mode: str, method: str) -> _Merged:
+def _merged(logs: Sequence[LaserLog], by: Method, method: str) -> _Merged:
     maps: dict[ScanId, SegmentMap] = {
-        ScanId(number, index): extract(scan, parameters, number, index)
+        ScanId(number, index): extract(scan, by.parameters, number, index)
         for number, log in enumerate(logs)
         for index, scan in enumerate(log)
     }
     with progress("matching") as tell:
-        merged = merge_maps(maps, parameters, heuristic, mode, method, workers=2, progress=tell)
+        merged = merge_maps(maps, by.parameters, by.heuristic, by.mode, method, workers=2, progress=tell)
     return _Merged(", ".join(log.name for log in logs), merged)
 
 

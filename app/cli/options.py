@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
 import typer
 
-from segmap.candidates import HEURISTICS
 from segmap.errors import ParameterError
-from segmap.integration import MODES
+from segmap.integration import DEFAULT_HEURISTIC, MODES, heuristics
 from segmap.logs import read_log
 from segmap.parameters import PRESETS, Parameters, preset
 from segmap.scans import LaserLog
 
 __all__ = [
-    "DEFAULT_HEURISTIC",
     "DEFAULT_MODE",
     "Heuristic",
     "Json",
     "Log",
+    "Method",
     "Mode",
     "Preset",
     "Setting",
+    "method_of",
     "one_of",
     "parameters_of",
     "read",
@@ -35,32 +36,61 @@ def one_of(names: Iterable[str]) -> str:
     return "|".join(names)
 
 
-DEFAULT_MODE = MODES[-1]
-DEFAULT_HEURISTIC = HEURISTICS[0]
+DEFAULT_MODE = "verified"
+DEFAULT_PRESET = "default"
 
 Log: TypeAlias = Annotated[
     Path, typer.Argument(metavar="LOG", help="A laser log, plain or gzipped.", show_default=False)
 ]
 Json: TypeAlias = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
-Mode: TypeAlias = Annotated[str, typer.Option(metavar=one_of(MODES), help="How the best candidate is chosen.")]
-Heuristic: TypeAlias = Annotated[
-    str, typer.Option(metavar=one_of(HEURISTICS), help="Which angles give candidate transformations.")
+Mode: TypeAlias = Annotated[
+    str, typer.Option(metavar=one_of(MODES), help="As the paper has it, or with evidence beyond the paper.")
 ]
-Preset: TypeAlias = Annotated[str, typer.Option(metavar=one_of(PRESETS), help="The parameters to start from.")]
+Heuristic: TypeAlias = Annotated[
+    str | None,
+    typer.Option(metavar=one_of(heuristics(DEFAULT_MODE)), help="Which candidates are tried; default: the mode's own."),
+]
+Preset: TypeAlias = Annotated[
+    str | None, typer.Option(metavar=one_of(PRESETS), help="The parameters to start from; default: the mode's own.")
+]
 Setting: TypeAlias = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Change a parameter; can be given several times."),
 ]
 
 
-def parameters_of(preset_name: str, settings: list[str] | None) -> Parameters:
+@dataclass(frozen=True)
+class Method:
+    """How pairs are integrated: everything a result depends on beside the scans."""
+
+    parameters: Parameters
+    heuristic: str
+    mode: str
+
+
+def method_of(mode: str, heuristic: str | None, preset_name: str | None, settings: list[str] | None) -> Method:
+    """The method that options describe; heuristic and preset are the mode's own unless others are asked for.
+
+    Raises:
+        ParameterError: there is no such mode, heuristic, preset or parameter, or a value is impossible.
+    """
+    if mode not in MODES:
+        raise ParameterError(f"There is no mode {mode!r}. Modes are: {', '.join(MODES)}.")
+    known = heuristics(mode)
+    if heuristic is not None and heuristic not in known:
+        raise ParameterError(f"There is no heuristic {heuristic!r} in {mode} mode. Heuristics are: {', '.join(known)}.")
+    own = mode if mode in PRESETS else DEFAULT_PRESET
+    return Method(parameters_of(preset_name or own, settings), heuristic or DEFAULT_HEURISTIC[mode], mode)
+
+
+def parameters_of(preset_name: str | None, settings: list[str] | None) -> Parameters:
     """A preset with the changes of ``--set``.
 
     Raises:
         ParameterError: a change is not NAME=VALUE, or cannot be made.
     """
     changes = [_assignment(text) for text in settings or []]
-    return preset(preset_name).with_text(dict(changes))
+    return preset(preset_name or DEFAULT_PRESET).with_text(dict(changes))
 
 
 def _assignment(text: str) -> tuple[str, str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import typer
 
+from app.cli.options import Method
 from app.inputs import facts_of, remember
 from app.resources import program_version
 from segmap.errors import ExportError, LogError
@@ -63,17 +64,15 @@ def new_project(
     path: Path,
     name: str,
     logs: Sequence[tuple[Path, LaserLog]],
-    parameters: Parameters,
-    heuristic: str,
-    mode: str,
+    by: Method,
     accepted: Mapping[IntegrationId, Match],
 ) -> None:
     """A project of some logs in which these integrations are accepted, and everything else is for a person."""
-    with Store.create(path, name, parameters, heuristic, mode, who=COMMAND) as store:
+    with Store.create(path, name, by.parameters, by.heuristic, by.mode, who=COMMAND) as store:
         for file, log in logs:
             info = store.add_log(log.name, _content(file), scans=len(log), format=log.format, who=COMMAND)
             remember(store, info.sha256, facts_of(log))
-        choices = tuple(_choice(integration, match, parameters) for integration, match in accepted.items())
+        choices = tuple(_choice(integration, match, by.parameters) for integration, match in accepted.items())
         if choices:
             store.append(Decide(choices=choices, who=COMMAND, reason="accepted without asking"))
 

@@ -17,7 +17,7 @@ import app.server
 from app.cli import main
 from app.resources import program_version, samples_folder
 from segmap.benchmark import is_right
-from segmap.integration import match_maps
+from segmap.integration import DEFAULT_HEURISTIC, match_maps
 from segmap.logs import read_log
 from segmap.parameters import Parameters, preset
 from segmap.pose import Pose2
@@ -91,7 +91,14 @@ def test_help_names_every_command_and_every_command_has_help(run: Run) -> None:
         (("info", __file__), "is no laser log"),
         (("segments", HALL, "--scan", "300"), "hall.log has no scan 300: it holds scans 0 to"),
         (("integrate", HALL, "0", "99"), "hall.log has no scan 99"),
-        (("integrate", HALL, "0", "1", "--heuristic", "best"), "There is no heuristic 'best'. Heuristics are: all"),
+        (
+            ("integrate", HALL, "0", "1", "--heuristic", "best"),
+            "no heuristic 'best' in verified mode. Heuristics are: automatic",
+        ),
+        (
+            ("integrate", HALL, "0", "1", "--mode", "paper", "--heuristic", "automatic"),
+            "in paper mode. Heuristics are: all",
+        ),
         (("integrate", HALL, "0", "1", "--mode", "guess"), "There is no mode 'guess'. Modes are: paper"),
         (("integrate", HALL, "0", "1", "--preset", "mine"), "There is no preset 'mine'. Presets are: default"),
         (("integrate", HALL, "0", "1", "--set", "taus=1"), "There is no parameter 'taus'"),
@@ -214,6 +221,18 @@ def test_integrate_says_what_the_library_found(document: Callable[..., Any], heu
     assert (told["verdict"], told["reasons"]) == (match.verdict, list(match.reasons))
     assert told["milliseconds"] > 0.0
     assert told.get("draws") == match.draws
+
+
+def test_each_mode_has_its_own_defaults(document: Callable[..., Any]) -> None:
+    """Verified mode is the default; heuristic and preset are the mode's own unless others are asked for."""
+    maps = [extract(read_log(OFFICE).scan(i), Parameters(), index=i) for i in (20, 21)]
+    for mode, options in (("verified", ()), ("paper", ("--mode", "paper"))):
+        told = document("integrate", OFFICE, 20, 21, *options)
+        match = match_maps(maps[0], maps[1], preset("verified" if mode == "verified" else "default"), None, mode)
+        assert (told["mode"], told["heuristic"]) == (mode, DEFAULT_HEURISTIC[mode])
+        assert (told["value"], told["verdict"]) == (match.value, match.verdict)
+        assert told["reasons"] == list(match.reasons)
+        assert told["confidence"] == match.confidence
 
 
 def test_integrate_finds_where_the_robot_went(document: Callable[..., Any]) -> None:
