@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 
-from segmap.candidates import HEURISTICS
-from segmap.integration import integrate
+from segmap.integration import MODES, heuristics, integrate
 from segmap.parameters import Parameters
-from segmap.segments import Order, SegmentMap
+from segmap.scans import LaserScan
+from segmap.segments import Order, extract
 
 __all__ = ["warm_up"]
-
-ROOM = np.array([[0.0, 0.0, 4.0, 0.0], [4.0, 0.0, 4.0, 3.0], [4.0, 3.0, 0.0, 3.0], [0.0, 3.0, 0.0, 0.0]])
 
 
 def warm_up() -> None:
     """Integrate two small maps in every way there is."""
-    room = SegmentMap(ROOM, Order.BEAMS)
-    undirected = SegmentMap(ROOM, Order.NONE, np.zeros(len(ROOM), bool))
-    for heuristic in HEURISTICS:
-        for other in (room, undirected):
-            integrate(room, other, Parameters(random_rounds=1), heuristic, "paper")
+    parameters = Parameters(random_rounds=1)
+    headings = np.radians(np.arange(180.0) - 90.0)
+    ranges = 2.0 / np.maximum(np.abs(np.cos(headings)), np.abs(np.sin(headings)))  # half a square room
+    room = extract(LaserScan(ranges, -math.pi / 2, math.radians(1.0)), parameters)
+    undirected = replace(room, order=Order.NONE, directed=np.zeros(len(room), bool))
+    for mode in MODES:
+        for heuristic in heuristics(mode):
+            for other in (room, undirected):
+                integrate(room, other, parameters, heuristic, mode)
 
 
 if __name__ == "__main__":
