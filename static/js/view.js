@@ -32,31 +32,24 @@ export class View extends EventTarget {
     this.apply(known ? await post(this.#url, { action: "select", value: integration }) : await get(this.#url));
   }
 
-  /** Ask for a change, one after the other; a view the server no longer has is opened again first. */
-  act(action, value = null) {
-    this.#sending += 1;
-    const sent = this.#queue.then(() => this.#post(action, value));
-    const done = sent.then((snapshot) => this.#sending === 1 && this.apply(snapshot)).finally(() => (this.#sending -= 1));
-    this.#queue = done.catch(() => {});
-    return done;
+  /** Ask for a change and show it; a view the server no longer has is opened again first. */
+  async act(action, value = null) {
+    const snapshot = await this.#send(action, value);
+    if (this.#idle) this.apply(snapshot);
   }
 
-  /** Select an integration: shown at once; of many quick selections only the last is sent. */
+  /** Select an integration: shown at once; of many quick selections only the last is sent, and only its answer counts. */
   async select(id) {
     this.apply({ ...this.snapshot, integration: id, candidate: 0 });
     const idle = this.#wanted === null;
     this.#wanted = id;
-    while (idle && this.#wanted !== null) {
-      const sent = this.#wanted;
-      await this.act("select", sent).catch((error) => this.project.tell("trouble", error));
-      if (this.#wanted === sent) this.#wanted = null;
-    }
+    while (idle && this.#wanted !== null) await this.#sendWanted();
   }
 
   /** A snapshot that came by itself: the scene's own panel was used. Of several, and beside an action, the last counts. */
   hear(snapshot) {
     clearTimeout(this.#heard);
-    this.#heard = setTimeout(() => this.#sending === 0 && this.apply(snapshot), SETTLE);
+    this.#heard = setTimeout(() => this.#idle && this.apply(snapshot), SETTLE);
   }
 
   apply(snapshot) {
@@ -81,6 +74,26 @@ export class View extends EventTarget {
 
   get #url() {
     return `/api/views/${encodeURIComponent(this.id)}`;
+  }
+
+  get #idle() {
+    return this.#sending === 0 && this.#wanted === null;
+  }
+
+  async #sendWanted() {
+    const sent = this.#wanted;
+    const snapshot = await this.#send("select", sent).catch((error) => this.project.tell("trouble", error));
+    if (this.#wanted !== sent) return;
+    this.#wanted = null;
+    if (snapshot && this.#idle) this.apply(snapshot);
+  }
+
+  /** Send actions one after the other. */
+  #send(action, value) {
+    this.#sending += 1;
+    const sent = this.#queue.then(() => this.#post(action, value)).finally(() => (this.#sending -= 1));
+    this.#queue = sent.catch(() => {});
+    return sent;
   }
 
   async #post(action, value) {

@@ -187,26 +187,36 @@ def server(chromium: Browser, tmp_path_factory: pytest.TempPathFactory) -> Itera
     server.kill()
 
 
-@pytest.fixture
-def pictures(tmp_path: Path) -> Path:
+@pytest.fixture(scope="session")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where screenshots go: SEGMAP_SCREENSHOTS, or a temporary folder."""
-    folder = Path(os.environ.get("SEGMAP_SCREENSHOTS", tmp_path))
+    folder = Path(os.environ.get("SEGMAP_SCREENSHOTS") or tmp_path_factory.mktemp("screenshots"))
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
+@pytest.fixture(scope="session")
+def make_desk(chromium: Browser, pictures: Path) -> Callable[..., Desk]:
+    """Open a window of its own; whoever asks for it closes it."""
+
+    def make(width: int = 1280, height: int = 800, scheme: str = "light") -> Desk:
+        size: Any = {"width": width, "height": height}
+        context = chromium.new_context(viewport=size, color_scheme=scheme)  # type: ignore[arg-type]
+        return Desk(context.new_page(), pictures)
+
+    return make
+
+
 @pytest.fixture
-def new_desk(chromium: Browser, pictures: Path) -> Iterator[Callable[..., Desk]]:
-    """Open a page in a window of its own; at the end, nothing may have complained in it."""
+def new_desk(make_desk: Callable[..., Desk]) -> Iterator[Callable[..., Desk]]:
+    """Open a window of its own; it is closed at the end, and nothing may have complained in it."""
     desks: list[Desk] = []
 
-    def open_desk(width: int = 1280, height: int = 800, scheme: str = "light") -> Desk:
-        size: Any = {"width": width, "height": height}
-        context = chromium.new_context(viewport=size, color_scheme=scheme, accept_downloads=True)  # type: ignore[arg-type]
-        desks.append(Desk(context.new_page(), pictures))
+    def make(*size: int, **looks: Any) -> Desk:
+        desks.append(make_desk(*size, **looks))
         return desks[-1]
 
-    yield open_desk
+    yield make
     for desk in desks:
         desk.page.context.close()
     assert [error for desk in desks for error in desk.errors] == []
@@ -214,5 +224,5 @@ def new_desk(chromium: Browser, pictures: Path) -> Iterator[Callable[..., Desk]]
 
 @pytest.fixture
 def desk(new_desk: Callable[..., Desk]) -> Desk:
-    """A page of the usual size."""
+    """A window of the usual size."""
     return new_desk()
