@@ -24,6 +24,7 @@ SERVE = (
     "serve(port=int(sys.argv[1]), workspace=Path(sys.argv[2]))"
 )
 STARTED = re.compile(r"segmap is at (http://\S+?)/ ")
+START_SECONDS = 60.0
 STOP_SECONDS = 20.0
 MATCHING_SECONDS = 90.0
 PATIENCE = 20_000.0
@@ -50,21 +51,21 @@ class Server:
 
     def __init__(self, workspace: Path) -> None:
         self.workspace = workspace
+        self.log = workspace / "server.log"
         self.url = "http://127.0.0.1:0"
         self.start()
 
     def start(self) -> None:
         """Start, at the port it had before, and wait until it answers."""
         command = [sys.executable, "-c", SERVE, self.url.rpartition(":")[2], str(self.workspace)]
-        self._process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
-        assert self._process.stderr is not None
-        seen = ""
-        for line in self._process.stderr:
-            seen += line
-            if found := STARTED.search(line):
-                self.url = found[1]
-                return
-        pytest.fail(f"the server did not start:\n{seen}")
+        with self.log.open("w") as log:
+            self._process = subprocess.Popen(command, cwd=ROOT, stderr=log)
+        end = time.monotonic() + START_SECONDS
+        while not (found := STARTED.search(self.log.read_text())):
+            if self._process.poll() is not None or time.monotonic() > end:
+                pytest.fail(f"the server did not start:\n{self.log.read_text()}")
+            time.sleep(0.05)
+        self.url = found[1]
 
     def stop(self) -> None:
         """End it as Ctrl+C does."""
@@ -76,7 +77,7 @@ class Server:
 
     def _end(self, how: signal.Signals) -> None:
         self._process.send_signal(how)
-        self._process.communicate(timeout=STOP_SECONDS)
+        self._process.wait(STOP_SECONDS)
 
     def get(self, path: str) -> Any:
         """What the API answers."""
@@ -185,6 +186,8 @@ def server(chromium: Browser, tmp_path_factory: pytest.TempPathFactory) -> Itera
     server = Server(tmp_path_factory.mktemp("projects"))
     yield server
     server.kill()
+    complaints = server.log.read_text()
+    assert "Traceback" not in complaints, complaints
 
 
 @pytest.fixture(scope="session")
