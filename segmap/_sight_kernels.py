@@ -43,20 +43,20 @@ class Sighting(NamedTuple):
     """(m, 3): x, y of returns in the map's frame, and the width of the beam there, metres"""
     beams: FloatArray
     """(n, 5): of every beam of every sensor, x, y in the sensor's frame and range (NaN: no return), and the
-    least and the largest range around it, over one beam before and two after (inf and -inf: none)"""
+    least and the largest range of the surface around it, one beam before to two after (inf and -inf: none)"""
     sensors: FloatArray
     """(s, 8): cosine, sine, x, y of the sensor's pose; first angle, angle step; first beam, number of beams"""
 
 
 @_inlined
 def _beam_of(x, y, sensors, s):  # type: ignore[no-untyped-def]
-    """The beam at or just before the direction of a point of the sensor's frame; -1: just before the first."""
+    """The beam at or just before the direction of a point of the sensor's frame; negative: before the first."""
     turn = 2.0 * math.pi / abs(sensors[s, 5])
     beam = (math.atan2(y, x) - sensors[s, 4]) / sensors[s, 5]
     beam -= turn * math.floor(beam / turn)
-    if beam >= turn - 1.0 and beam >= sensors[s, 7]:
-        return -1
-    return int(beam)
+    if beam >= sensors[s, 7] and beam - sensors[s, 7] > turn - beam - 1.0:  # nearer to the first than to the last
+        beam -= turn
+    return math.floor(beam)
 
 
 @_inlined
@@ -111,9 +111,11 @@ def _seen_by(x, y, beams, sensors, s, tolerance, gap, depth):  # type: ignore[no
         return SUPPORTED
     if a < 0 or b < 0:
         return UNSEEN
-    if distance < min(beams[a, 2], beams[b, 2]):
+    before = beams[a, 2]
+    after = beams[b, 2]
+    if distance < before and distance < after:  # false for NaN, beams without a return
         return CONTRADICTED
-    if 0.0 < distance - max(beams[a, 2], beams[b, 2]) < depth:
+    if distance > before and distance > after and distance - max(before, after) < depth:
         return SHADOWED
     return UNSEEN
 

@@ -71,12 +71,13 @@ def _points(sight: Sight) -> FloatArray:
 def _beams(sight: Sight) -> FloatArray:
     ranges, angles = sight.scan.ranges, sight.scan.angles
     around = np.stack([_neighbour(ranges, step, sight.scan.all_round) for step in (-1, 0, 1, 2)])
+    bulge = np.cos(min(abs(sight.scan.angle_step), np.pi) / 2.0)  # the line between two returns passes in front of both
     return np.column_stack(
         (
             ranges * np.cos(angles),
             ranges * np.sin(angles),
             ranges,
-            np.fmin.reduce(around, axis=0, initial=np.inf),
+            bulge * np.fmin.reduce(around, axis=0, initial=np.inf),
             np.fmax.reduce(around, axis=0, initial=-np.inf),
         )
     )
