@@ -14,7 +14,7 @@ from numba import njit
 
 from segmap.pose import FloatArray, IntArray
 
-__all__ = ["closest_edges", "equal_angles", "evaluate", "first_of_each", "matching_pairs", "superimpose"]
+__all__ = ["closest_edges", "covers", "equal_angles", "evaluate", "first_of_each", "matching_pairs", "superimpose"]
 
 TOUCH = 1e-9
 """metres; a segment whose extreme is this near to a line touches it, whatever the rounding"""
@@ -323,6 +323,43 @@ def middles_within(edges: FloatArray, segments: FloatArray, tolerance: float) ->
             x1, y1, x2, y2 = segments[i, 0], segments[i, 1], segments[i, 2], segments[i, 3]
             near[i, k] = _squared_distance(x, y, x1, y1, x2, y2) <= tolerance * tolerance
     return near
+
+
+@_compiled
+def covers(edges: FloatArray, segments: FloatArray, reach: float) -> FloatArray:
+    """For each edge (k, 4) and segment (n, 4), the stretch of the edge along which the segment lies within reach.
+
+    Returns (k, n, 2): from and to, metres from the start of the edge, within it; equal where there is none.
+    """
+    result = np.zeros((len(edges), len(segments), 2))
+    directions = _directions(edges)
+    for k in range(len(edges)):
+        ux, uy, length = directions[k, 0], directions[k, 1], directions[k, 2]
+        for i in range(len(segments)):
+            ax = segments[i, 0] - edges[k, 0]
+            ay = segments[i, 1] - edges[k, 1]
+            bx = segments[i, 2] - edges[k, 0]
+            by = segments[i, 3] - edges[k, 1]
+            side_a = ux * ay - uy * ax
+            side_b = ux * by - uy * bx
+            if min(side_a, side_b) > reach or max(side_a, side_b) < -reach:
+                continue
+            first, last = 0.0, 1.0  # shares of the segment between which it is within reach of the edge's line
+            if abs(side_b - side_a) > 1e-12:
+                p = (-reach - side_a) / (side_b - side_a)
+                q = (reach - side_a) / (side_b - side_a)
+                first = max(0.0, min(p, q))
+                last = min(1.0, max(p, q))
+            along_a = ux * ax + uy * ay
+            along_b = ux * bx + uy * by
+            s = along_a + first * (along_b - along_a)
+            t = along_a + last * (along_b - along_a)
+            begin = max(0.0, min(s, t))
+            end = min(length, max(s, t))
+            if end > begin:
+                result[k, i, 0] = begin
+                result[k, i, 1] = end
+    return result
 
 
 @_compiled

@@ -20,6 +20,7 @@ __all__ = [
     "classify",
     "distinct",
     "look",
+    "normal_equations",
     "refine",
 ]
 
@@ -290,8 +291,20 @@ def _accumulate(points, moved, jacobians, beams, sensors, gate, gap, normal, rhs
 
 
 @_compiled
-def _normal_equations(sighting_1, sighting_2, pose, gate, gap, normal, rhs):  # type: ignore[no-untyped-def]
-    """Both ways: points of 2 against the surfaces of 1, and points of 1 against those of 2."""
+def normal_equations(
+    sighting_1: Sighting,
+    sighting_2: Sighting,
+    pose: FloatArray,
+    gate: float,
+    gap: float,
+    normal: FloatArray,
+    rhs: FloatArray,
+) -> float:
+    """Points of 2 against the surfaces of 1, and points of 1 against those of 2, at ``T_1_2`` (3,).
+
+    Fills ``normal`` (3, 3) with J^T W J and ``rhs`` (3,) with -J^T W r of the distances r, metres; returns the
+    sum of the weights W.
+    """
     cosine = math.cos(pose[2])
     sine = math.sin(pose[2])
     normal[:] = 0.0
@@ -326,23 +339,19 @@ def refine(
     first_gate: float,
     last_gate: float,
     gap: float,
-) -> tuple[FloatArray, FloatArray]:
-    """Each ``T_1_2`` of poses (k, 3) after some steps of robust point-to-line least squares with a shrinking gate.
-
-    Returns the poses, and the normal matrices (k, 3, 3) of the last step: weighted sums over points, per metre
-    squared for x and y.
-    """
+) -> FloatArray:
+    """Each ``T_1_2`` of poses (k, 3) after some steps of robust point-to-line least squares with a shrinking gate."""
     refined = poses.copy()
-    information = np.zeros((len(poses), 3, 3))
+    normal = np.empty((3, 3))
     rhs = np.empty(3)
     for k in range(len(poses)):
         for step in range(steps):
             gate = first_gate * (last_gate / first_gate) ** (step / max(1, steps - 1))
-            total = _normal_equations(sighting_1, sighting_2, refined[k], gate, gap, information[k], rhs)
+            total = normal_equations(sighting_1, sighting_2, refined[k], gate, gap, normal, rhs)
             if total < 3.0:
                 break
-            _step(information[k], rhs, refined[k])
-    return refined, information
+            _step(normal, rhs, refined[k])
+    return refined
 
 
 @_compiled

@@ -11,7 +11,7 @@ from segmap import _kernels
 from segmap.chains import MatchingChain
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
-from segmap.segments import Order, SegmentMap, Source
+from segmap.segments import LEAST_LENGTH, Order, SegmentMap, Source
 
 __all__ = ["Fusion", "Polyline", "fuse", "polyline"]
 
@@ -150,23 +150,68 @@ def _distance(p: FloatArray, q: FloatArray) -> float:
     return float(np.hypot(p[0] - q[0], p[1] - q[1]))
 
 
-# --- where the edges come from --------------------------------------------------------------------
+# --- what of a polyline is wall, and where it comes from ------------------------------------------
 
 
 def _as_map(line: Polyline, members: SegmentMap, parameters: Parameters) -> SegmentMap:
-    """The edges of a polyline as a map, without connectors that would claim a wall nobody saw.
+    """The edges of a polyline as a map (line 12); without stretches that would claim a wall nobody saw."""
+    if parameters.max_connector is None:
+        return _all_edges(line, members, parameters.fusion_tolerance)
+    reach = parameters.segment_distance_threshold * parameters.point_distance_tolerance
+    return SegmentMap.joined(
+        [_covered(line, members, reach, parameters.max_connector), _left_aside(line, members, reach)]
+    )
 
-    An edge stands for a segment when it is its closest one, or has its middle within the tolerance of it.
-    """
-    edges = line.edges
+
+def _all_edges(line: Polyline, members: SegmentMap, tolerance: float) -> SegmentMap:
+    """Every edge; it stands for a segment whose closest edge it is, or that its middle is within the tolerance of."""
     _, closest = closest_edges(members.coordinates, line.vertices)
-    owners = _kernels.middles_within(edges, members.coordinates, parameters.fusion_tolerance)
+    owners = _kernels.middles_within(line.edges, members.coordinates, tolerance)
     owners[np.arange(len(members)), closest] = 1
     sources = tuple(_united(members, np.flatnonzero(column)) for column in owners.T)
-    whole = SegmentMap(edges, Order.NONE, np.full(len(edges), line.directed), sources)
-    if parameters.max_connector is None:
-        return whole
-    return whole.take(np.flatnonzero(owners.any(axis=0) | (whole.lengths <= parameters.max_connector)))
+    return SegmentMap(line.edges, Order.NONE, np.full(len(line.edges), line.directed), sources)
+
+
+def _covered(line: Polyline, members: SegmentMap, reach: float, longest_gap: float) -> SegmentMap:
+    """The stretches of the edges along which segments lie within reach; gaps up to a length are bridged."""
+    rows: list[FloatArray] = []
+    sources: list[tuple[Source, ...]] = []
+    for edge, cover in zip(line.edges, _kernels.covers(line.edges, members.coordinates, reach), strict=True):
+        length = _distance(edge[:2], edge[2:])
+        along = (edge[2:] - edge[:2]) / max(length, LEAST_LENGTH)
+        lying = np.flatnonzero(cover[:, 1] - cover[:, 0] > LEAST_LENGTH)
+        for first, last in _bridged(cover[lying], length, longest_gap):
+            rows.append(np.concatenate((edge[:2] + first * along, edge[:2] + last * along)))
+            within = (cover[lying, 0] <= last) & (cover[lying, 1] >= first)
+            sources.append(_united(members, lying[within]))
+    coordinates = np.reshape(rows, (-1, 4))
+    return SegmentMap(coordinates, Order.NONE, np.full(len(rows), line.directed), tuple(sources))
+
+
+def _bridged(intervals: FloatArray, length: float, longest_gap: float) -> list[tuple[float, float]]:
+    """The union of intervals (n, 2) of an edge, metres from its start, with short gaps and short ends filled."""
+    if not len(intervals):
+        return [(0.0, length)] if LEAST_LENGTH < length <= longest_gap else []
+    spans: list[tuple[float, float]] = []
+    for first, last in intervals[np.argsort(intervals[:, 0], kind="stable")].tolist():
+        if spans and first - spans[-1][1] <= longest_gap:
+            spans[-1] = spans[-1][0], max(spans[-1][1], last)
+        else:
+            spans.append((first, last))
+    if spans[0][0] <= longest_gap:
+        spans[0] = 0.0, spans[0][1]
+    if length - spans[-1][1] <= longest_gap:
+        spans[-1] = spans[-1][0], length
+    return spans
+
+
+def _left_aside(line: Polyline, members: SegmentMap, reach: float) -> SegmentMap:
+    """The segments that no stretch of the polyline stands for: they stay as they are."""
+    start, end = members.coordinates[:, :2], members.coordinates[:, 2:]
+    beyond = np.zeros(len(members), bool)
+    for point in (start, (start + end) / 2.0, end):
+        beyond |= closest_edges(np.concatenate((point, point), axis=1), line.vertices)[0] > reach
+    return members.take(np.flatnonzero(beyond))
 
 
 def _united(members: SegmentMap, rows: IntArray) -> tuple[Source, ...]:

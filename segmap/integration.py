@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,12 +15,12 @@ from segmap.errors import ParameterError
 from segmap.evaluation import best, evaluate, matching_values
 from segmap.fusion import Fusion, fuse
 from segmap.parameters import Parameters
-from segmap.pose import FloatArray, Pose2
-from segmap.refinement import Uncertainty, uncertainty
+from segmap.pose import FloatArray, IntArray, Pose2
+from segmap.refinement import Uncertainty, information, uncertainty
 from segmap.segments import SegmentMap
 from segmap.verdict import Findings, Verdict, confidence, judge
 from segmap.verification import Verified, verify
-from segmap.visibility import Evidence, evidence, sighting
+from segmap.visibility import Evidence, Sighting, evidence, sighting
 
 __all__ = [
     "AUTOMATIC",
@@ -290,18 +290,27 @@ def _verified(task: _Task) -> _Found:
     seen_1, seen_2 = sighting(task.map_1), sighting(task.map_2)
     if seen_1 is None or seen_2 is None:
         return _as_the_paper(replace(task, heuristic=_by_value(task.heuristic)))
-    found, kept = Candidates.joined([]), None
+    found, kept, discarded = Candidates.joined([]), None, 0
     ranked: tuple[Candidate, ...] = ()
     for heuristic in STAGES if task.heuristic == AUTOMATIC else (task.heuristic,):
-        block = _worth_judging(task, heuristic)
-        if len(block):
-            fresh = verify(seen_1, seen_2, block.poses, task.parameters)
-            kept = kept.joined(fresh, len(found), task.parameters) if kept else fresh
-        found = Candidates.joined([found, block])
-        ranked = _ranked(task, found, kept) if kept else ()
+        block = Candidates.joined(list(_checked(candidates(task.map_1, task.map_2, heuristic, task.parameters), task)))
+        rows, crossing = _worth_judging(task, block)
+        if len(rows):
+            fresh = verify(seen_1, seen_2, block.poses[rows], task.parameters).placed(len(found) + rows)
+            kept = kept.joined(fresh, task.parameters) if kept else fresh
+        found, discarded = Candidates.joined([found, block]), discarded + crossing
+        ranked = _ranked(task, found, kept, seen_1, seen_2) if kept else ()
         if ranked and _judgement(ranked, task.parameters)[0] is Verdict.ACCEPTED:
             break
-    return _Found(ranked, len(found), draws=found.draws)
+    return _Found(ranked, len(found), discarded, found.draws)
+
+
+def _checked(blocks: Iterable[Candidates], task: _Task) -> Iterator[Candidates]:
+    """The blocks, with a look before each at whether to stop."""
+    for block in blocks:
+        if task.check is not None:
+            task.check()
+        yield block
 
 
 def _by_value(heuristic: str) -> str:
@@ -309,19 +318,18 @@ def _by_value(heuristic: str) -> str:
     return DEFAULT_HEURISTIC["paper"] if heuristic == AUTOMATIC else heuristic
 
 
-def _worth_judging(task: _Task, heuristic: str) -> Candidates:
-    """All candidates of a heuristic, or the best by value where there are many."""
-    if task.check is not None:
-        task.check()
+def _worth_judging(task: _Task, block: Candidates) -> tuple[IntArray, int]:
+    """The rows of all candidates, or of the best by value where there are many; and how many were discarded."""
     most = task.parameters.judged_candidates
-    found = Candidates.joined(list(candidates(task.map_1, task.map_2, heuristic, task.parameters)))
-    if len(found) <= most:
-        return found
-    values = evaluate(task.map_1, task.map_2, found.poses, task.parameters, workers=task.workers, check=task.check)
-    return found.take(np.sort(best(values, most)))
+    if len(block) <= most:
+        return np.arange(len(block)), 0
+    values = evaluate(task.map_1, task.map_2, block.poses, task.parameters, workers=task.workers, check=task.check)
+    return np.sort(best(values, most)), int(np.isnan(values).sum())
 
 
-def _ranked(task: _Task, found: Candidates, kept: Verified) -> tuple[Candidate, ...]:
+def _ranked(
+    task: _Task, found: Candidates, kept: Verified, seen_1: Sighting, seen_2: Sighting
+) -> tuple[Candidate, ...]:
     """The distinct refined candidates, best first."""
     return tuple(
         Candidate(
@@ -331,10 +339,12 @@ def _ranked(task: _Task, found: Candidates, kept: Verified) -> tuple[Candidate, 
             index=int(row),
             score=float(score),
             evidence=evidence(totals),
-            uncertainty=uncertainty(normal, task.parameters),
+            uncertainty=uncertainty(
+                information(task.map_1, task.map_2, seen_1, seen_2, T_1_2, task.parameters), task.parameters
+            ),
         )
-        for row, T_1_2, totals, score, normal in zip(
-            kept.rows, (Pose2(*pose) for pose in kept.poses), kept.totals, kept.scores, kept.normals, strict=True
+        for row, T_1_2, totals, score in zip(
+            kept.rows, (Pose2(*pose) for pose in kept.poses), kept.totals, kept.scores, strict=True
         )
     )
 

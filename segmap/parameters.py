@@ -170,7 +170,7 @@ class Parameters(BaseModel):
     max_connector: float | None = _parameter(
         0.2,
         "m",
-        "Longer edges of a polyline that stand for no segment are left out (none: the paper keeps all).",
+        "Longer stretches of a polyline along which no segment lies are left out (none: the paper keeps all).",
         ge=0.0,
         le=100000.0,
     )

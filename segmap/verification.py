@@ -7,7 +7,7 @@ refined and judged by more; the best of those are refined again and judged by al
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,26 +42,27 @@ class Verified:
     """shape (k, 4): metres supported, contradicted, shadowed, unseen"""
     scores: FloatArray
     """shape (k,), metres"""
-    normals: FloatArray
-    """shape (k, 3, 3): normal matrices of the refinement"""
 
     def take(self, rows: IntArray) -> Verified:
         """Some of them."""
-        return Verified(self.rows[rows], self.poses[rows], self.totals[rows], self.scores[rows], self.normals[rows])
+        return Verified(self.rows[rows], self.poses[rows], self.totals[rows], self.scores[rows])
 
     def best(self, parameters: Parameters) -> Verified:
         """The distinct ones, best first."""
         order = np.argsort(-self.scores, kind="stable")
         return self.take(_distinct(self.poses, order, parameters, FINALISTS))
 
-    def joined(self, other: Verified, offset: int, parameters: Parameters) -> Verified:
-        """The best of both; ``offset`` is added to the rows of the other."""
+    def placed(self, places: IntArray) -> Verified:
+        """The same, where the candidates judged were those in these places among all."""
+        return replace(self, rows=places[self.rows])
+
+    def joined(self, other: Verified, parameters: Parameters) -> Verified:
+        """The best of both."""
         both = Verified(
-            np.concatenate((self.rows, other.rows + offset)),
+            np.concatenate((self.rows, other.rows)),
             np.concatenate((self.poses, other.poses)),
             np.concatenate((self.totals, other.totals)),
             np.concatenate((self.scores, other.scores)),
-            np.concatenate((self.normals, other.normals)),
         )
         return both.best(parameters)
 
@@ -70,13 +71,13 @@ def verify(seen_1: Sighting, seen_2: Sighting, poses: FloatArray, parameters: Pa
     """Judge, refine and judge again candidates ``T_1_2`` of poses (k, 3); the distinct best of them."""
     rows = _promising(seen_1, seen_2, poses, parameters)
     middle_1, middle_2 = thinned(seen_1, MIDDLE), thinned(seen_2, MIDDLE)
-    moved, _ = refined(middle_1, middle_2, poses[rows], STEPS, parameters.refine_gate, LAST_GATE)
+    moved = refined(middle_1, middle_2, poses[rows], STEPS, parameters.refine_gate, LAST_GATE)
     fine_1, fine_2 = thinned(seen_1, FINE), thinned(seen_2, FINE)
     order = np.argsort(-score(look(fine_1, fine_2, moved, parameters), parameters), kind="stable")
     kept = _distinct(moved, order, parameters, FINALISTS)
-    final, normals = refined(fine_1, fine_2, moved[kept], FINAL_STEPS, FINAL_GATE, LAST_GATE)
+    final = refined(fine_1, fine_2, moved[kept], FINAL_STEPS, FINAL_GATE, LAST_GATE)
     totals = look(seen_1, seen_2, final, parameters)
-    return Verified(rows[kept], final, totals, score(totals, parameters), normals).best(parameters)
+    return Verified(rows[kept], final, totals, score(totals, parameters)).best(parameters)
 
 
 def _promising(seen_1: Sighting, seen_2: Sighting, poses: FloatArray, parameters: Parameters) -> IntArray:

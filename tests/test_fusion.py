@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from worlds import maps, poses, room
 
+from segmap._kernels import covers
 from segmap.chains import MatchingChain, matching_chains
 from segmap.fusion import closest_edges, fuse, polyline
 from segmap.parameters import Parameters, preset
@@ -187,19 +188,51 @@ def test_every_fused_segment_knows_its_scans():
     assert by_scans == [{1}, {0, 1}, {0, 1}, {0, 1}, {0, 1}] or sorted(map(sorted, by_scans)) == [[0, 1]] * 4 + [[1]]
 
 
-def test_connectors_are_short_or_left_out():
-    """An edge that stands for no segment is a connector; a long one would claim a wall nobody saw."""
+def test_no_wall_is_claimed_that_nobody_saw(benchmarks, datasets):
+    """At shipped defaults: the map is nowhere farther from a source than half a gap and the reach, and loses none."""
+    parameters = Parameters()
+    reach = parameters.segment_distance_threshold * parameters.point_distance_tolerance
+    for log, pair in real_pairs.some(benchmarks, datasets, each=6, kinds=("consecutive", "wide")):
+        map_1, map_2 = real_pairs.maps(pair, log, parameters)
+        both = SegmentMap.joined([map_1, map_2.moved(pair.truth)])
+        result = fused(map_1, map_2, pair.truth, parameters).map
+        assert farthest_from(result, both) <= parameters.max_connector / 2.0 + 2.0 * reach
+        assert farthest_from(both, result) <= 2.0 * reach
+        assert {s for sources in result.sources for s in sources} == {s for sources in both.sources for s in sources}
+
+
+def farthest_from(segment_map, other):
+    """How far a point of one map lies from the other at most, metres, by points 5 cm apart and a foreign ruler."""
+    lines = shapely.segmentize(shapely.linestrings(segment_map.coordinates.reshape(-1, 2, 2)), 0.05)
+    whole = shapely.union_all(shapely.linestrings(other.coordinates.reshape(-1, 2, 2)))
+    return shapely.distance(shapely.points(shapely.get_coordinates(lines)), whole).max()
+
+
+@given(maps(most=3), maps(most=3), st.floats(0.01, 1.0))
+@loose
+def test_covers_are_the_stretches_a_foreign_ruler_finds(edges, segments, reach):
+    """Where a segment runs within reach of an edge's line, and beside the edge, that stretch of the edge is covered."""
+    found = covers(edges.coordinates, segments.coordinates, reach)
+    for k, (x1, y1, x2, y2) in enumerate(edges.coordinates):
+        along = Pose2(x1, y1, math.atan2(y2 - y1, x2 - x1)).inverse()  # the edge on the x axis, from the origin
+        strip = shapely.box(0.0, -reach, math.dist((x1, y1), (x2, y2)), reach)
+        for i, segment in enumerate(segments.coordinates.reshape(-1, 2, 2)):
+            within = shapely.intersection(shapely.linestrings(along @ segment), strip)
+            expected = (within.bounds[2] - within.bounds[0]) if not within.is_empty else 0.0
+            assert found[k, i, 1] - found[k, i, 0] == pytest.approx(expected, abs=1e-6)
+
+
+def test_the_paper_keeps_every_edge():
+    """Without a limit the polyline stays whole; with one, the stretch across a doorway is left out."""
     ends = SegmentMap(np.array([[0, 0, 1.0, 0], [3.0, 0, 4.0, 0]]), sources=((Source(0, 0, 0),), (Source(0, 0, 1),)))
-    other = SegmentMap(np.array([[1.5, 0.3, 2.0, 0.3]]), sources=((Source(0, 1, 0),),))
+    other = SegmentMap(np.array([[0.5, 0.01, 0.9, 0.01]]), sources=((Source(0, 1, 0),),))
     chain = MatchingChain(((0, 0, 1.0), (1, 0, 1.0)))
-    kept = fuse(ends, other, Pose2.identity(), (chain,), PAPER)
-    limited = fuse(ends, other, Pose2.identity(), (chain,), PAPER.replace(max_connector=0.2))
-    assert len(limited.map) < len(kept.map)
-    assert {source for sources in limited.map.sources for source in sources} == {
-        source for sources in (*ends.sources, *other.sources) for source in sources
-    }
-    bare = [length for length, sources in zip(limited.map.lengths, limited.map.sources, strict=True) if not sources]
-    assert all(length <= 0.2 for length in bare)
+    whole = fuse(ends, other, Pose2.identity(), (chain,), PAPER).map
+    parted = fuse(ends, other, Pose2.identity(), (chain,), PAPER.replace(max_connector=0.2)).map
+    assert whole.coordinates.tolist() == [[0, 0, 4, 0]]
+    assert sorted(parted.coordinates.tolist()) == [[0, 0, 1, 0], [3, 0, 4, 0]]
+    bridged = fuse(ends, other, Pose2.identity(), (chain,), PAPER.replace(max_connector=2.5)).map
+    assert bridged.coordinates.tolist() == [[0, 0, 4, 0]]
 
 
 def test_unmatched_segments_are_kept_as_they_are():
