@@ -30,6 +30,10 @@ class LogPairs:
     log: LaserLog
     pairs: tuple[Pair, ...]
 
+    def pair_set(self, every: int = 1) -> PairSet:
+        """Every ``every``-th pair, of all kinds."""
+        return PairSet(log=self.name, pairs=self.pairs[::every])
+
     def of_kind(self, kind: str, every: int = 1) -> tuple[Pair, ...]:
         """The pairs of one kind in file order, or every ``every``-th of them, the first included."""
         return tuple(pair for pair in self.pairs if pair.kind == kind)[::every]
