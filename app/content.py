@@ -10,6 +10,7 @@ import numpy as np
 
 from app.drawables import Box, Pick, box
 from app.palette import PALETTES, Palette
+from app.sights import Sights
 from segmap.chains import MatchingChain
 from segmap.fusion import Fusion
 from segmap.integration import Candidate
@@ -44,6 +45,19 @@ class Pair:
     """at that candidate"""
     fusion: Fusion | None = None
     """at that candidate, where it was asked for"""
+    sights: Sights | None = None
+    """at that candidate, where it was asked for and the scans are known"""
+    confidence: float | None = None
+    """verified mode: that the best candidate is right, in 0..1"""
+    verdict: str | None = None
+    """the program's, on the best candidate; None: not matched yet"""
+    reasons: tuple[str, ...] = ()
+    """of that verdict, in words"""
+
+    @property
+    def rank(self) -> int | None:
+        """Of the candidate shown, 0 for the best."""
+        return None if self.candidate is None else self.ranked.index(self.candidate)
 
     @cached_property
     def by_value(self) -> tuple[int, ...]:

@@ -9,8 +9,11 @@ from pathlib import Path
 from typing import BinaryIO
 
 from app.inputs import facts_of, remember
+from app.modes import NEW_PROJECTS as MODE
 from segmap.errors import LogError
+from segmap.integration import DEFAULT_HEURISTIC, DEFAULT_PRESET, chosen_heuristic
 from segmap.logs import base_name, read_log
+from segmap.parameters import preset
 from segmap.project import ProjectState
 from segmap.scans import LaserLog
 from segmap.store import Store
@@ -53,7 +56,7 @@ def fill(path: Path, title: str, sources: Sequence[Source]) -> Filled:
     if not logs:
         raise LogError(" ".join(failures))
     filled = Filled(problems=tuple(failures))
-    with Store.create(path, title) as store:
+    with Store.create(path, title, preset(DEFAULT_PRESET[MODE]), DEFAULT_HEURISTIC[MODE], MODE) as store:
         for source, log in logs:
             source.file.seek(0)
             info = store.add_log(log.name, source.file, scans=len(log), format=log.format)
@@ -79,8 +82,10 @@ def copy_project(file: BinaryIO, path: Path) -> ProjectState:
 
     Raises:
         ProjectError: it is not a project, is damaged, or is from a newer version.
+        ParameterError: it is in a mode that does not exist, or by a heuristic the mode does not have.
     """
     with path.open("xb") as target:
         shutil.copyfileobj(file, target)
     with Store.open(path) as store:
+        chosen_heuristic(store.state.mode, store.state.heuristic)
         return store.state

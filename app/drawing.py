@@ -14,9 +14,10 @@ from app import grid, map_layers, pair_layers
 from app.content import Content, Pair
 from app.drawables import Box, Drawable, Frame, label, lines
 from app.palette import RGB
+from app.sights import CLASSES
 from segmap.pose import Pose2
 
-__all__ = ["LAYERS", "STAGES", "Layer", "Picture", "draw", "layers"]
+__all__ = ["LAYERS", "LAYERS_OF", "STAGES", "Layer", "Picture", "draw", "layers"]
 
 EMPTY: Box = (-5.0, -5.0, 5.0, 5.0)
 """metres, shown where there is nothing"""
@@ -83,13 +84,15 @@ def draw(content: Content) -> Picture:
 
 def layers(content: Content) -> tuple[Layer, ...]:
     """The layers of the content's stage, with captions and units."""
-    return tuple(_layer(name, visible, content) for name, visible in _STAGES[content.stage].items())
+    return tuple(_layer(name, visible, content) for name, visible in LAYERS_OF[content.stage].items())
 
 
 def _layer(name: str, visible: bool, content: Content) -> Layer:
     kind = _KINDS[name]
     if name == "candidates":
         visible = content.dimension == 3
+    if name == "returns" and content.stage == "candidate":
+        visible = content.pair is None or content.pair.sights is None  # otherwise they are drawn as lines of sight
     visible = content.shown.get(name, visible)
     return Layer(name, kind.title, kind.caption(content), kind.unit, kind.colours(content), visible)
 
@@ -124,6 +127,17 @@ def _ghosts(pair: Pair) -> str:
     if not found:
         return "no other candidate says something else"
     return "the next best: " + ", ".join(f"#{rank + 1} with {rival.value:.2f} m" for rank, rival in found)
+
+
+def _sight_caption(pair: Pair) -> str:
+    if pair.sights is None:
+        return "no candidate to look at" if pair.candidate is None else "nothing is known of the scans' beams"
+    told = ", ".join(f"{name} {getattr(pair.sights.evidence, name):.1f} m" for name in CLASSES)
+    return f"what the beams of each scan say of the other's returns: {told}"
+
+
+def _sight_colours(content: Content) -> tuple[RGB, ...]:
+    return content.palette.sights
 
 
 def _chain_caption(pair: Pair) -> str:
@@ -195,6 +209,7 @@ _KINDS = {
         _of_pair(lambda p: f"{len(p.returns[0])} and {len(p.returns[1])} points the laser met"),
         _colours("first", "second"),
     ),
+    "sights": _Kind("Lines of sight", "m", pair_layers.lines_of_sight, _of_pair(_sight_caption), _sight_colours),
     "sensors": _Kind(
         "Sensors",
         "m, rad",
@@ -241,7 +256,7 @@ _KINDS = {
 LAYERS = tuple(_KINDS)
 """Names of all layers."""
 
-_STAGES: dict[str, dict[str, bool]] = {
+LAYERS_OF: dict[str, dict[str, bool]] = {
     "scans": {"returns": True, "first": False, "second": False, "sensors": True, "grid": True},
     "segments": {"first": True, "second": True, "returns": True, "sensors": True, "grid": True},
     "candidate": {
@@ -250,7 +265,8 @@ _STAGES: dict[str, dict[str, bool]] = {
         "angle": True,
         "rivals": True,
         "candidates": False,
-        "returns": True,
+        "sights": True,
+        "returns": False,
         "sensors": True,
         "grid": True,
     },
@@ -261,6 +277,7 @@ _STAGES: dict[str, dict[str, bool]] = {
         "angle": False,
         "rivals": False,
         "candidates": False,
+        "sights": False,
         "returns": True,
         "sensors": True,
         "grid": True,
@@ -270,5 +287,5 @@ _STAGES: dict[str, dict[str, bool]] = {
 }
 """The layers of each stage, and whether they are drawn where nobody said otherwise."""
 
-STAGES = tuple(_STAGES)
+STAGES = tuple(LAYERS_OF)
 """The stages of an integration, in order, and the merged map."""

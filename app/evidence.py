@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from app.content import Content, Pair
+from app.drawing import LAYERS_OF
 from app.looks import Looks
+from app.sights import sights
 from segmap.chains import matching_chains
 from segmap.fusion import fuse
-from segmap.integration import Match
+from segmap.integration import Match, heuristics
 from segmap.project import IntegrationId, ProjectState
 from segmap.scans import ScanId
 
@@ -33,13 +35,20 @@ def scan_name(scan: ScanId, state: ProjectState) -> str:
     return f"{state.logs[scan.log].name}, scan {scan.scan}"
 
 
+def _found(match: Match) -> dict[str, Any]:
+    """What a pair shows of its match."""
+    told = {name: getattr(match, name) for name in ("ranked", "confidence", "reasons")}
+    return {**told, "verdict": str(match.verdict)}
+
+
 class Evidence:
-    """The content of a view's picture; chains and fused maps are computed once for each candidate. Thread-safe."""
+    """The content of a view's picture; what takes time is computed once for each candidate. Thread-safe."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
         self._chains = lru_cache(KEPT)(matching_chains)
         self._fused = lru_cache(KEPT)(fuse)
+        self._sights = lru_cache(KEPT)(sights)
 
     def match(self, looks: Looks) -> Match | None:
         """The match of the integration looked at, by the heuristic looked at; None: not computed yet."""
@@ -53,8 +62,9 @@ class Evidence:
         return integration is not None and self._session.outcome(integration, heuristic) is None
 
     def heuristic(self, looks: Looks) -> str:
-        """The heuristic looked at, by name."""
-        return looks.heuristic or self._session.state.heuristic
+        """The heuristic looked at, by name; the project's, where its mode does not know the one looked at."""
+        state = self._session.state
+        return looks.heuristic if looks.heuristic in heuristics(state.mode) else state.heuristic
 
     def content(self, looks: Looks) -> Content:
         """All that the picture is made from."""
@@ -84,7 +94,7 @@ class Evidence:
             maps=(session.segment_map(scans.first), session.segment_map(scans.second)),
             returns=(session.scan(scans.first).returns(reach)[0], session.scan(scans.second).returns(reach)[0]),
             parameters=state.parameters,
-            ranked=match.ranked if match else (),
+            **({} if match is None else _found(match)),
         )
         return self._at_candidate(pair, looks) if pair.ranked else pair
 
@@ -94,7 +104,10 @@ class Evidence:
         fusion = None
         if looks.stage == "fused":
             fusion = self._fused(*pair.maps, candidate.T_1_2, chains, pair.parameters)
-        return replace(pair, candidate=candidate, chains=chains, fusion=fusion)
+        seen = None
+        if "sights" in LAYERS_OF[looks.stage]:
+            seen = self._sights(*pair.maps, candidate.T_1_2, pair.parameters)
+        return replace(pair, candidate=candidate, chains=chains, fusion=fusion, sights=seen)
 
     def _message(self, looks: Looks, pair: Pair | None) -> str:
         """Why there is less to see than one might expect, or something else; empty where there is no reason to ask."""

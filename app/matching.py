@@ -14,18 +14,31 @@ from typing import Any, Protocol
 from pydantic import TypeAdapter
 
 from app.jobs import Backlog, Check
-from app.review import Outcome
-from segmap.candidates import HEURISTICS
+from app.review import THRESHOLDS, Outcome
 from segmap.errors import CancelledError, SegmapError
-from segmap.integration import Match
-from segmap.parameters import Parameters
+from segmap.integration import DEFAULT_PRESET, Match, heuristics
+from segmap.parameters import Parameters, preset
+from segmap.verdict import CALIBRATION
 
 __all__ = ["Matching", "Progress", "Settings", "Task"]
 
 MATCHES_IN_MEMORY = 256
 PREPARING = "Getting ready; the first time this takes some seconds."
-IRRELEVANT = frozenset({"value_threshold", "fusion_tolerance", "fusion_variant", "fusion_bound", "pivot_form"})
+IRRELEVANT = {*THRESHOLDS, "fusion_tolerance", "fusion_variant", "fusion_bound", "max_connector", "pivot_form"}
 """parameters no candidate's value depends on"""
+EVIDENCE = {
+    "sight_tolerance",
+    "shadow_depth",
+    "conflict_weight",
+    "shadow_weight",
+    "unseen_weight",
+    "judged_candidates",
+    "refined_candidates",
+    "refine_gate",
+    "rival_distance",
+    "rival_angle",
+}
+"""parameters that matter to verified mode only"""
 OWN = {
     "consecutive": {"segment_length_percentage", "consecutive_over_short", "consecutive_strict"},
     "random": {"segment_division_factor", "random_rounds", "seed", "good_enough"},
@@ -56,9 +69,17 @@ class Settings:
     def key(self, heuristic: str) -> str:
         """The same for settings under which a heuristic finds the same."""
         foreign = {name for other, names in OWN.items() if other != heuristic for name in names}
-        relevant = self.parameters.model_dump(mode="json", exclude=set(IRRELEVANT | foreign))
-        told = json.dumps([self.mode, heuristic, relevant], sort_keys=True)
+        unused = set() if self.mode == "verified" else EVIDENCE
+        relevant = self.parameters.model_dump(mode="json", exclude=IRRELEVANT | foreign | unused)
+        calibration = CALIBRATION if self.mode == "verified" else {}
+        told = json.dumps([self.mode, heuristic, relevant, calibration], sort_keys=True)
         return hashlib.sha256(told.encode()).hexdigest()[:24]
+
+    @property
+    def searched(self) -> Parameters:
+        """The parameters to search with: the thresholds judge afterwards, and never decide what is found."""
+        own = preset(DEFAULT_PRESET[self.mode])
+        return self.parameters.replace(**{name: getattr(own, name) for name in THRESHOLDS})
 
 
 @dataclass(frozen=True)
@@ -125,12 +146,12 @@ class Matching:
 
     def use(self, settings: Settings, heuristic: str) -> None:
         """Find all matches by a heuristic under these settings; what was found under others is no longer shown."""
-        keys = {name: settings.key(name) for name in HEURISTICS}
+        keys = {name: settings.key(name) for name in heuristics(settings.mode)}
         with self._lock:
             self._settings = settings
             if (keys, heuristic) == (self._keys, self._heuristic):
                 return
-            self._forget(name for name in HEURISTICS if keys[name] != self._keys.get(name))
+            self._forget(name for name in {*keys, *self._keys} if keys.get(name) != self._keys.get(name))
             self._keys, self._heuristic = keys, heuristic
             self._recall(heuristic)
             missing = [id for id in self._integrations if self._outcomes[id, heuristic] is None]
@@ -226,7 +247,7 @@ class Matching:
     def _wanted(self, task: Task) -> bool:
         """False for results that come after the parameters were changed."""
         with self._lock:
-            return task == self._task(task.integration, task.heuristic)
+            return task.key == self._keys.get(task.heuristic)
 
     def _keep(self, place: tuple[str, str], match: Match) -> None:
         self._matches[place] = match
@@ -234,7 +255,7 @@ class Matching:
             self._matches.popitem(last=False)
 
     def _task(self, integration: str, heuristic: str) -> Task:
-        return Task(integration, heuristic, self._keys[heuristic])
+        return Task(integration, heuristic, self._keys.get(heuristic, ""))
 
     @staticmethod
     def _match_key(task: Task) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from app.jobs import Check, Latest
 from app.resources import program_version
+from app.review import THRESHOLDS
 from segmap.errors import CancelledError, ExportError, ProjectError, SegmapError
 from segmap.events import IntegrationId
 from segmap.export import export_map
@@ -34,8 +35,8 @@ class Merged:
 
 
 def map_parameters(parameters: Parameters) -> Parameters:
-    """The same for parameters that make the same map: the threshold only proposes, decisions hold."""
-    return parameters.replace(value_threshold=0.0)
+    """The same for parameters that make the same map: thresholds only propose, decisions hold."""
+    return parameters.replace(**dict.fromkeys(THRESHOLDS, 0.0))
 
 
 def merge_project(

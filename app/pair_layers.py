@@ -14,7 +14,19 @@ from segmap.integration import Candidate
 from segmap.pose import FloatArray, Pose2
 from segmap.segments import SegmentMap
 
-__all__ = ["angle", "chains", "first", "fused", "returns", "rival_segments", "rivals", "second", "sensors", "unmatched"]
+__all__ = [
+    "angle",
+    "chains",
+    "first",
+    "fused",
+    "lines_of_sight",
+    "returns",
+    "rival_segments",
+    "rivals",
+    "second",
+    "sensors",
+    "unmatched",
+]
 
 RIVALS = 3
 """ghosts drawn at most"""
@@ -68,6 +80,18 @@ def returns(content: Content) -> Iterator[Drawable]:
             shade = colour if alone else palette.faint(colour, 0.45)
             thickness = 3.0 if alone else 2.5
             yield Drawable("returns", "returns", "points", points(held), shade, frame, depth=2, thickness=thickness)
+
+
+def lines_of_sight(content: Content) -> Iterator[Drawable]:
+    """The returns of both scans, each in the colour of what the other scan's lines of sight say of it."""
+    seen = None if content.pair is None else content.pair.sights
+    if seen is None:
+        return
+    palette = np.array(content.palette.sights, np.uint8)
+    for frame, held, found in zip(FRAMES, seen.points, seen.classes, strict=True):
+        if len(held):
+            neutral, colours = content.palette.neutral, palette[found]
+            yield Drawable("sights", "sights", "points", points(held), neutral, frame, 6, 5.0, colours)
 
 
 def sensors(content: Content) -> Iterator[Drawable]:

@@ -7,15 +7,21 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from app.criterion import CRITERIA, Criterion
 from segmap.events import Decision, IntegrationId
-from segmap.integration import Match
+from segmap.integration import Match, Verdict, findings_of
+from segmap.parameters import Parameters
+from segmap.pose import Pose2
 from segmap.project import ProjectState
 from segmap.scans import ScanId
+from segmap.verdict import Findings, judge
 
 __all__ = ["Flips", "Outcome", "Row", "Rows", "counts", "flips", "queue", "row"]
 
 STATES = ("pending", "failed", "none", "matching", "accepted", "rejected")
 """In queue order: what a person can decide, what a person should know, what is not ready, what is done."""
+THRESHOLDS = ("value_threshold", "confidence_accept", "confidence_review")
+"""the parameters a verdict depends on"""
 
 
 @dataclass(frozen=True)
@@ -32,12 +38,23 @@ class Outcome:
     milliseconds: float = 0.0
     failure: str = ""
     """why matching failed, for people; empty where it did not"""
+    confidence: float | None = None
+    """verified mode"""
+    findings: Findings | None = None
+    """verified mode: what speaks for and against the best candidate"""
 
     @classmethod
     def of(cls, match: Match) -> Outcome:
         """The outcome of a match."""
         pose = None if match.T_1_2 is None else (match.T_1_2.x, match.T_1_2.y, match.T_1_2.theta)
-        return cls(match.heuristic, match.value, pose, match.candidates, match.draws, match.milliseconds)
+        found = match.confidence, findings_of(match)
+        return cls(match.heuristic, match.value, pose, match.candidates, match.draws, match.milliseconds, "", *found)
+
+    def verdict(self, parameters: Parameters) -> Verdict:
+        """What the program says under these thresholds."""
+        if self.pose is None:
+            return Verdict.REJECTED
+        return judge(self.value, self.findings, parameters)[0]
 
 
 @dataclass(frozen=True)
@@ -51,8 +68,14 @@ class Row:
     """one of ``STATES``"""
     value: float | None = None
     """metres; of the decision where there is one, otherwise of the best candidate"""
+    verdict: str | None = None
+    """what the program says: accepted, review or rejected; None: of this pose nothing (yet)"""
     above: bool | None = None
-    """whether the value is above the threshold"""
+    """whether that is accepted"""
+    confidence: float | None = None
+    """verified mode: probability, in 0..1, that the pose is right"""
+    score: float | None = None
+    """verified mode: support less conflict, metres"""
     heuristic: str = ""
     candidates: int | None = None
     milliseconds: float | None = None
@@ -72,10 +95,12 @@ class Flips:
     would_fail: tuple[str, ...]
 
 
-def row(blank: Row, heuristic: str, outcome: Outcome | None, decision: Decision | None, threshold: float) -> Row:
+def row(blank: Row, heuristic: str, outcome: Outcome | None, decision: Decision | None, parameters: Parameters) -> Row:
     """The row of an integration: its decision if there is one, on the evidence there is."""
-    found = _undecided(replace(blank, heuristic=heuristic), outcome, threshold)
-    return found if decision is None else _decided(found, decision, threshold)
+    found = _undecided(replace(blank, heuristic=heuristic), outcome, parameters)
+    if decision is None:
+        return found
+    return _decided(found, decision, outcome is not None and _same(decision.T_1_2, outcome.pose))
 
 
 class Rows:
@@ -83,66 +108,89 @@ class Rows:
 
     def __init__(self, integrations: Iterable[str]) -> None:
         self._blank = {id: Row(id, *IntegrationId.parse(id), "matching") for id in integrations}
-        self._made: dict[str, tuple[Outcome | None, Decision | None, str, float, Row]] = {}
+        self._made: dict[str, tuple[Outcome | None, Decision | None, tuple[Any, ...], Row]] = {}
 
     def __contains__(self, integration: str) -> bool:
         return integration in self._blank
 
     def row(self, integration: str, state: ProjectState, outcome: Outcome | None) -> Row:
         """The row of an integration in a state of the project."""
-        decision, threshold = state.decisions.get(integration), state.parameters.value_threshold
+        decision, settings = state.decisions.get(integration), _settings(state)
         held = self._made.get(integration)
-        if held and held[0] is outcome and held[1] is decision and held[2:4] == (state.heuristic, threshold):
-            return held[4]
-        made = row(self._blank[integration], state.heuristic, outcome, decision, threshold)
-        self._made[integration] = outcome, decision, state.heuristic, threshold, made
+        if held and held[0] is outcome and held[1] is decision and held[2] == settings:
+            return held[3]
+        made = self.tried(integration, state, outcome, state.parameters)
+        self._made[integration] = outcome, decision, settings, made
         return made
 
+    def tried(self, integration: str, state: ProjectState, outcome: Outcome | None, parameters: Parameters) -> Row:
+        """The row as it would be under other thresholds; nothing is kept."""
+        return row(self._blank[integration], state.heuristic, outcome, state.decisions.get(integration), parameters)
 
-def _undecided(blank: Row, outcome: Outcome | None, threshold: float) -> Row:
+
+def _settings(state: ProjectState) -> tuple[Any, ...]:
+    """What a row shows of a project's settings."""
+    return state.heuristic, *(getattr(state.parameters, name) for name in THRESHOLDS)
+
+
+def _undecided(blank: Row, outcome: Outcome | None, parameters: Parameters) -> Row:
     if outcome is None:
         return blank
     if outcome.failure:
         return replace(blank, state="failed", reason=outcome.failure)
-    found = outcome.pose is not None
+    verdict = outcome.verdict(parameters)
     return replace(
         blank,
-        state="pending" if found else "none",
+        state="none" if outcome.pose is None else "pending",
         value=outcome.value,
-        above=found and outcome.value > threshold,
+        verdict=str(verdict),
+        above=verdict is Verdict.ACCEPTED,
+        confidence=outcome.confidence,
+        score=outcome.findings.score if outcome.findings else None,
         candidates=outcome.candidates,
         milliseconds=outcome.milliseconds,
     )
 
 
-def _decided(found: Row, decision: Decision, threshold: float) -> Row:
-    value = found.value if decision.value is None else decision.value
+def _decided(found: Row, decision: Decision, judged: bool) -> Row:
+    """A decided row; what the program says is only shown where it is ``judged``: said of the pose decided on."""
+    silent: dict[str, Any] = {} if judged else dict.fromkeys(("verdict", "above", "confidence", "score"))
     return replace(
         found,
         state=decision.verdict,
-        value=value,
-        above=None if value is None else value > threshold,
+        value=found.value if decision.value is None else decision.value,
         heuristic=decision.heuristic or found.heuristic,
         who=decision.who,
         reason=decision.reason,
+        **silent,
     )
 
 
-def queue(rows: Iterable[Row], threshold: float) -> list[Row]:
-    """Rows in the order of review: the closer a value is to the threshold, the more it needs a person."""
-    return sorted(rows, key=lambda r: (STATES.index(r.state), _clarity(r, threshold), r.first, r.second))
+def _same(pose: Pose2 | None, other: tuple[float, float, float] | None) -> bool:
+    return (None if pose is None else tuple(pose)) == other
 
 
-def _clarity(r: Row, threshold: float) -> float:
-    return abs(r.value - threshold) if r.state == "pending" and r.value is not None else 0.0
+def queue(rows: Iterable[Row], mode: str, parameters: Parameters) -> list[Row]:
+    """Rows in the order of review: first what the program leaves to a person, and the closest to the threshold."""
+    criterion = CRITERIA[mode]
+    threshold = criterion.threshold(parameters)
+    return sorted(rows, key=lambda r: (*_need(r), _clarity(r, criterion, threshold), r.first, r.second))
 
 
-def flips(rows: Iterable[Row], threshold: float, other: float) -> Flips:
-    """What another threshold would change for the undecided integrations that have a transformation."""
-    undecided = [(r.id, r.value) for r in rows if r.state == "pending" and r.value is not None]
-    passes = tuple(id for id, value in undecided if other < value <= threshold)
-    fails = tuple(id for id, value in undecided if threshold < value <= other)
-    return Flips(passes, fails)
+def _need(r: Row) -> tuple[int, bool]:
+    return STATES.index(r.state), r.verdict != Verdict.REVIEW
+
+
+def _clarity(r: Row, criterion: Criterion, threshold: float) -> float:
+    quantity = criterion.of(r)
+    return abs(quantity - threshold) if r.state == "pending" and quantity is not None else 0.0
+
+
+def flips(before: Iterable[Row], after: Iterable[Row]) -> Flips:
+    """The undecided integrations with a transformation that are accepted before or after, not both."""
+    pairs = [(old, new) for old, new in zip(before, after, strict=True) if old.state == "pending"]
+    passes = tuple(old.id for old, new in pairs if new.above and not old.above)
+    return Flips(passes, tuple(old.id for old, new in pairs if old.above and not new.above))
 
 
 def counts(rows: Iterable[Row]) -> Mapping[str, int]:

@@ -13,6 +13,7 @@ __all__ = [
     "Component",
     "Counts",
     "Created",
+    "Criterion",
     "DecisionMade",
     "Decisions",
     "Detail",
@@ -81,11 +82,12 @@ class Turn(_Body):
 
 
 class ParametersChange(_Body):
-    """Change parameters, from those in force or from a preset; change the heuristic."""
+    """Change parameters, from those in force or from a preset; change the heuristic, and the mode."""
 
     changes: Annotated[dict[Name, Scalar], Field(default_factory=dict, max_length=200)]
     preset: Name | None = None
     heuristic: Name | None = None
+    mode: Name | None = None
     who: Name = ""
 
 
@@ -212,6 +214,18 @@ class Component(BaseModel):
     """metres, of all segments"""
 
 
+class Criterion(BaseModel):
+    """What the threshold of a mode is about."""
+
+    parameter: str
+    quantity: Literal["value", "confidence"]
+    """the field of a row that it works on"""
+    unit: str
+    maximum: float | None
+    step: float
+    inclusive: bool
+
+
 class Project(BaseModel):
     """A project, open."""
 
@@ -220,9 +234,11 @@ class Project(BaseModel):
     logs: list[LogFacts]
     parameters: dict[str, Any]
     threshold: float
+    criterion: Criterion
     heuristic: str
     heuristics: list[str]
     mode: str
+    modes: list[str]
     revision: int
     progress: ProgressBody
     undo: str | None
@@ -243,7 +259,10 @@ class Integration(BaseModel):
     second: str
     state: Literal["matching", "pending", "accepted", "rejected", "none", "failed"]
     value: float | None
+    verdict: Literal["accepted", "review", "rejected"] | None
     above: bool | None
+    confidence: float | None
+    score: float | None
     heuristic: str
     candidates: int | None
     milliseconds: float | None
@@ -270,6 +289,7 @@ class HeuristicResult(BaseModel):
     draws: int | None
     milliseconds: float
     value: float
+    confidence: float | None
     pose: tuple[float, float, float] | None
 
 

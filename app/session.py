@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+from app.criterion import CRITERIA, Criterion
 from app.deciding import choose, in_force
 from app.errors import UnknownError
 from app.inputs import Facts, Inputs
@@ -16,12 +17,12 @@ from app.jobs import Check, WarmUp
 from app.listeners import Listener, Listeners
 from app.matching import Matching, Progress, Settings
 from app.merged import Merged, MergedMap, map_parameters
+from app.modes import heuristic_in, parameters_in
 from app.review import Flips, Outcome, Row, Rows, counts, flips, queue
-from segmap.candidates import HEURISTICS
-from segmap.errors import ParameterError, SegmapError
+from segmap.errors import SegmapError
 from segmap.events import Choice, Clear, Decide, Event, IntegrationId, Redo, SetHeuristic, SetParameters, Undo
 from segmap.export import thumbnail
-from segmap.integration import Match, match_maps
+from segmap.integration import Match, chosen_heuristic, match_maps
 from segmap.merging import Component
 from segmap.parameters import preset
 from segmap.project import ProjectState
@@ -59,6 +60,7 @@ class Session:
         workers: int = 1,
         find: Finder = match_maps,
     ) -> None:
+        chosen_heuristic(store.state.mode, store.state.heuristic)
         self.id, self._store, self._find, self._warm_up = id, store, find, warm_up
         self._lock = threading.RLock()
         self._listeners = Listeners()
@@ -161,9 +163,8 @@ class Session:
         with self._lock:
             version, held = self._queue
             if version != self._version:
-                threshold = self._state.parameters.value_threshold
-                version = self._version
-                held = tuple(queue((self.row(name) for name in self._integrations), threshold))
+                state, version = self._state, self._version
+                held = tuple(queue((self.row(name) for name in self._integrations), state.mode, state.parameters))
                 self._queue = (version, held)
             return list(held)
 
@@ -171,9 +172,21 @@ class Session:
         """How many integrations there are, in all and in each state."""
         return counts(self.rows())
 
+    @property
+    def criterion(self) -> Criterion:
+        """What the threshold is about in the project's mode."""
+        return CRITERIA[self._state.mode]
+
     def preview_threshold(self, value: float) -> Flips:
-        """The undecided integrations that another threshold, in metres, would flip."""
-        return flips(self.rows(), self._state.parameters.value_threshold, value)
+        """The undecided integrations that another threshold of the criterion would flip.
+
+        Raises:
+            ParameterError: it is out of bounds.
+        """
+        state, rows = self._state, self.rows()
+        parameters = self.criterion.moved(state.parameters, value)
+        found = {r.id: self._matching.outcome(r.id, state.heuristic) for r in rows}
+        return flips(rows, [self._rows.tried(id, state, outcome, parameters) for id, outcome in found.items()])
 
     # --- decisions --------------------------------------------------------------------------------
 
@@ -234,21 +247,26 @@ class Session:
         *,
         preset_name: str | None = None,
         heuristic: str | None = None,
+        mode: str | None = None,
         who: str = "",
     ) -> Change:
-        """Change parameters, from those in force or from a preset, and the heuristic; all or nothing.
+        """Change parameters, from those in force or from a preset, the heuristic and the mode; all or nothing.
+
+        Another mode brings its own heuristic and its own threshold of the value, where those of the mode
+        before stood at their defaults.
 
         Raises:
             ParameterError: a name is unknown, or a value impossible.
         """
-        name = self._heuristic(heuristic)
         with self._lock:
-            base = self._state.parameters if preset_name is None else preset(preset_name)
+            wanted = mode or self._state.mode
+            name = heuristic_in(wanted, self._state, heuristic)
+            base = parameters_in(wanted, self._state) if preset_name is None else preset(preset_name)
             parameters, change = base.replace(**changes), Change(self._state)
             if parameters != self._state.parameters:
                 change = self._commit(SetParameters(parameters=parameters, who=who))
-            if name != self._state.heuristic:
-                change = self._commit(SetHeuristic(heuristic=name, who=who))
+            if (name, wanted) != (self._state.heuristic, self._state.mode):
+                change = self._commit(SetHeuristic(heuristic=name, mode=wanted, who=who))
             return change
 
     # --- the merged map ---------------------------------------------------------------------------
@@ -297,9 +315,7 @@ class Session:
         return integration
 
     def _heuristic(self, name: str | None) -> str:
-        if name is not None and name not in HEURISTICS:
-            raise ParameterError(f"There is no heuristic {name[:80]!r}. Heuristics are: {', '.join(HEURISTICS)}.")
-        return name or self._state.heuristic
+        return self._state.heuristic if name is None else chosen_heuristic(self._state.mode, name)
 
     def _choice(self, integration: str, verdict: str, heuristic: str, rank: int) -> Choice:
         outcome = self.outcome(integration, heuristic)
@@ -334,14 +350,15 @@ class Session:
             self._tell({"type": "decision", **told, "integrations": change.integrations, "rows": rows[:ROWS_TOLD]})
         if _settings_of(before) != _settings_of(state):
             parameters = state.parameters.model_dump(mode="json")
-            self._tell({"type": "parameters", **told, "parameters": parameters, "heuristic": state.heuristic})
+            method = {"heuristic": state.heuristic, "mode": state.mode}
+            self._tell({"type": "parameters", **told, "parameters": parameters, **method})
             self._progressed()
 
     def _match(self, integration: str, heuristic: str, settings: Settings, check: Check) -> Match:
         first, second = IntegrationId.parse(integration)
         maps = [self._inputs.segment_map(scan_id, settings.parameters) for scan_id in (first, second)]
         check()
-        return self._find(*maps, settings.parameters, heuristic, settings.mode, check=check)
+        return self._find(*maps, settings.searched, heuristic, settings.mode, check=check)
 
     def _prepare(self, check: Check) -> None:
         if self._warm_up is not None:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from app.content import Content
+from app.content import Content, Pair
 from app.drawing import STAGES, Layer, layers
 from app.evidence import Evidence
 from app.looks import Looks
 from app.palette import hexadecimal
 from app.picking import explain
 from app.review import Outcome
-from segmap.candidates import HEURISTICS
+from segmap.integration import Candidate, heuristics
 from segmap.pose import Pose2
+from segmap.verdict import Verdict, judge_value
 
 if TYPE_CHECKING:
     from app.session import Session
@@ -34,7 +36,10 @@ def snapshot(session: Session, evidence: Evidence, looks: Looks, content: Conten
         "row": None if looks.integration is None else session.row(looks.integration).to_json(),
         "names": None if content.pair is None else list(content.pair.names),
         "queue": _queue(session, looks),
-        **_candidate(content, state.parameters.value_threshold),
+        **_candidate(content),
+        **_verdict(content.pair),
+        "criterion": session.criterion.to_json(),
+        "threshold": session.criterion.threshold(state.parameters),
         "heuristics": _heuristics(session, looks, evidence.heuristic(looks)),
         "chains": _chains(content),
         "picked": explain(content),
@@ -63,18 +68,52 @@ def _queue(session: Session, looks: Looks) -> dict[str, Any]:
     return {"place": place, "total": len(rows), "pending": sum(row.state == "pending" for row in rows)}
 
 
-def _candidate(content: Content, threshold: float) -> dict[str, Any]:
+def _candidate(content: Content) -> dict[str, Any]:
+    """The candidate shown, and what speaks for and against it."""
     pair = content.pair
     candidate = None if pair is None else pair.candidate
+    if pair is None or candidate is None:
+        nothing = ("candidate", "value", "pose", "angles", "above", "score", "behind", "evidence", "uncertainty")
+        return {**dict.fromkeys(nothing), "candidates": 0 if pair is None else len(pair.ranked)}
     return {
-        "candidate": None if pair is None or candidate is None else pair.ranked.index(candidate),
-        "candidates": 0 if pair is None else len(pair.ranked),
-        "value": None if candidate is None else candidate.value,
-        "pose": None if candidate is None else _pose(candidate.T_1_2),
-        "angles": None if candidate is None else [list(candidate.angle_1), list(candidate.angle_2)],
-        "threshold": threshold,
-        "above": None if candidate is None else candidate.value > threshold,
+        "candidate": pair.rank,
+        "candidates": len(pair.ranked),
+        "value": candidate.value,
+        "pose": _pose(candidate.T_1_2),
+        "angles": [list(candidate.angle_1), list(candidate.angle_2)],
+        "above": _above(pair, candidate),
+        "score": candidate.score,
+        "behind": _behind(pair, candidate),
+        "evidence": _evidence(candidate),
+        "uncertainty": None if candidate.uncertainty is None else asdict(candidate.uncertainty),
     }
+
+
+def _above(pair: Pair, candidate: Candidate) -> bool | None:
+    """Whether the candidate would be accepted; None for the rivals in verified mode, which are not judged."""
+    if pair.rank == 0:
+        return pair.verdict == Verdict.ACCEPTED
+    if candidate.score is not None:
+        return None
+    return judge_value(candidate.value, pair.parameters)[0] is Verdict.ACCEPTED
+
+
+def _behind(pair: Pair, candidate: Candidate) -> float | None:
+    """How much less than the best a rival scores, metres."""
+    best = pair.ranked[0].score
+    return None if best is None or candidate.score is None else best - candidate.score
+
+
+def _evidence(candidate: Candidate) -> dict[str, float] | None:
+    found = candidate.evidence
+    return None if found is None else {**asdict(found), "agreement": found.agreement, "overlap": found.overlap}
+
+
+def _verdict(pair: Pair | None) -> dict[str, Any]:
+    """The program's verdict on the best candidate, in words and as a number."""
+    if pair is None:
+        return {"verdict": None, "reasons": [], "confidence": None}
+    return {"verdict": pair.verdict, "reasons": list(pair.reasons), "confidence": pair.confidence}
 
 
 def _pose(pose: Pose2) -> dict[str, float]:
@@ -85,8 +124,8 @@ def _heuristics(session: Session, looks: Looks, selected: str) -> list[dict[str,
     """One line for each heuristic on the selected pair; most of it is null where it was not tried yet."""
     if looks.integration is None:
         return []
-    outcomes = {name: session.outcome(looks.integration, name) for name in HEURISTICS}
-    return [{"heuristic": name, "selected": name == selected, **_outcome(outcomes[name])} for name in HEURISTICS]
+    outcomes = {name: session.outcome(looks.integration, name) for name in heuristics(session.state.mode)}
+    return [{"heuristic": name, "selected": name == selected, **_outcome(found)} for name, found in outcomes.items()]
 
 
 def _outcome(outcome: Outcome | None) -> dict[str, Any]:
@@ -96,6 +135,7 @@ def _outcome(outcome: Outcome | None) -> dict[str, Any]:
         "draws": outcome.draws if outcome is not None and known else None,
         "milliseconds": outcome.milliseconds if outcome is not None and known else None,
         "value": outcome.value if outcome is not None and known else None,
+        "confidence": outcome.confidence if outcome is not None and known else None,
         "pose": _pose(Pose2(*outcome.pose)) if outcome is not None and known and outcome.pose else None,
         "failure": outcome.failure if outcome is not None else "",
     }

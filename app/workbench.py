@@ -25,8 +25,8 @@ from app.palette import THEMES
 from app.picking import nearest
 from app.review import Row
 from app.snapshot import snapshot
-from segmap.candidates import HEURISTICS
 from segmap.errors import ProjectError
+from segmap.integration import heuristics
 
 if TYPE_CHECKING:
     from app.session import Session
@@ -96,7 +96,7 @@ class View:
         if integration not in self.session.integrations:
             raise UnknownError(f"The project has no integration {integration[:80]!r}.")
         decision = self.session.state.decisions.get(integration)
-        heuristic = decision.heuristic if decision and decision.heuristic in HEURISTICS else None
+        heuristic = decision.heuristic if decision and decision.heuristic in self._heuristics else None
         rank = (decision.candidate or 0) if decision else 0
         return replace(self._looks.at(integration, heuristic, rank), notice=notice)
 
@@ -116,11 +116,11 @@ class View:
                 self.select(ids[(place + step) % len(ids)])
 
     def next_candidate(self) -> None:
-        """The candidate with the next lower value."""
+        """The next best candidate."""
         self.set_candidate(self._rank() + 1)
 
     def previous_candidate(self) -> None:
-        """The candidate with the next higher value."""
+        """The candidate that ranks before this one."""
         self.set_candidate(self._rank() - 1)
 
     def set_candidate(self, rank: int) -> None:
@@ -146,12 +146,18 @@ class View:
 
     def _turn_heuristic(self, step: int) -> None:
         with self._acting:
-            place = HEURISTICS.index(self._evidence.heuristic(self._looks))
-            self.set_heuristic(HEURISTICS[(place + step) % len(HEURISTICS)])
+            names = self._heuristics
+            place = names.index(self._evidence.heuristic(self._looks))
+            self.set_heuristic(names[(place + step) % len(names)])
+
+    @property
+    def _heuristics(self) -> tuple[str, ...]:
+        """Those of the project's mode."""
+        return heuristics(self.session.state.mode)
 
     def set_heuristic(self, heuristic: str) -> None:
         """Look at what a heuristic finds on this pair; the project's heuristic stays what it is."""
-        _known(heuristic, HEURISTICS, "heuristic")
+        _known(heuristic, self._heuristics, "heuristic")
         with self._acting:
             self._look(self._looks.at(self._looks.integration, heuristic))
 

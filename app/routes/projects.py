@@ -26,6 +26,7 @@ from app.schemas import (
     Component,
     Counts,
     Created,
+    Criterion,
     LogFacts,
     ParameterList,
     ProgressBody,
@@ -38,8 +39,8 @@ from app.schemas import (
 )
 from app.session import Session
 from app.workspace import Summary
-from segmap.candidates import HEURISTICS
 from segmap.export import FORMATS
+from segmap.integration import MODES, heuristics
 from segmap.logs import base_name
 from segmap.merging import Component as MapComponent
 from segmap.parameters import PRESETS, describe
@@ -172,10 +173,12 @@ def project(session: Opened) -> Project:
         name=state.name,
         logs=[_log(session, index) for index in range(len(state.logs))],
         parameters=state.parameters.model_dump(mode="json"),
-        threshold=state.parameters.value_threshold,
+        threshold=session.criterion.threshold(state.parameters),
+        criterion=Criterion(**session.criterion.to_json()),
         heuristic=state.heuristic,
-        heuristics=list(HEURISTICS),
+        heuristics=list(heuristics(state.mode)),
         mode=state.mode,
+        modes=list(MODES),
         revision=state.revision,
         progress=ProgressBody(**session.progress.to_json()),
         undo=state.can_undo,

@@ -23,7 +23,7 @@ from app.schemas import (
     Turned,
 )
 from app.session import Change, Session
-from segmap.candidates import HEURISTICS
+from segmap.integration import heuristics
 
 __all__ = ["router"]
 
@@ -53,7 +53,7 @@ def integration(
 
 
 def _heuristics(session: Session, integration: str) -> list[HeuristicResult]:
-    known = [session.outcome(integration, name) for name in HEURISTICS]
+    known = [session.outcome(integration, name) for name in heuristics(session.state.mode)]
     fields = HeuristicResult.model_fields
     return [
         HeuristicResult(**{name: getattr(outcome, name) for name in fields})
@@ -106,8 +106,10 @@ def _made(session: Session, change: Change) -> dict[str, Any]:
 
 @router.post("/parameters")
 def parameters(session: Opened, body: ParametersChange) -> DecisionMade:
-    """Change parameters, the heuristic, or both; what was found under others is looked for again."""
-    change = session.configure(body.changes, preset_name=body.preset, heuristic=body.heuristic, who=body.who)
+    """Change parameters, the heuristic, the mode; what was found under others is looked for again."""
+    change = session.configure(
+        body.changes, preset_name=body.preset, heuristic=body.heuristic, mode=body.mode, who=body.who
+    )
     return DecisionMade(**_made(session, change))
 
 

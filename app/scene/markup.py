@@ -12,6 +12,7 @@ from html import escape
 from typing import Any
 
 from app.palette import PALETTES, hexadecimal
+from app.sights import CLASSES
 
 __all__ = ["candidate", "exports", "heuristics", "legend", "messages", "picked", "step", "value"]
 
@@ -51,22 +52,43 @@ def step(snapshot: Snapshot) -> str:
 
 
 def value(snapshot: Snapshot) -> str:
-    """The value against the threshold, as words and as a bar."""
-    held, threshold = snapshot["value"], snapshot["threshold"]
-    if held is None:
-        return _block(f'<span style="{FAINT}">No value yet. Threshold {threshold:.2f} m</span>')
+    """What the threshold is about against it, as words and as a bar; and the evidence, where there is any."""
+    return _block(_judged(snapshot) + _evidence(snapshot))
+
+
+def _judged(snapshot: Snapshot) -> str:
+    criterion, threshold = snapshot["criterion"], snapshot["threshold"]
+    held = snapshot[criterion["quantity"]]
+    if snapshot["behind"] is not None and snapshot["above"] is None:
+        return (
+            f'<div style="{NUMBERS}"><b>Rival</b> <span style="{FAINT}">scores {snapshot["behind"]:.2f} m less than '
+            "the best; the confidence is about the best</span></div>"
+        )
+    if snapshot["candidate"] is None or held is None:
+        return f'<span style="{FAINT}">No {criterion["quantity"]} yet. Threshold {_amount(threshold, criterion)}</span>'
     colour = _colour(snapshot, "good" if snapshot["above"] else "bad")
-    side = "above" if snapshot["above"] else "not above"
+    side = ("at or above" if criterion["inclusive"] else "above") if snapshot["above"] else _why_not(snapshot, held)
     words = (
-        f'<div style="{NUMBERS}"><span style="font-size:1.5em;font-weight:650">{held:.2f} m</span> '
+        f'<div style="{NUMBERS}"><span style="font-size:1.5em;font-weight:650">{_amount(held, criterion)}</span> '
         f'<span style="color:{colour};font-weight:600">{side} the threshold</span> '
-        f'<span style="{FAINT}">of {threshold:.2f} m</span></div>'
+        f'<span style="{FAINT}">of {_amount(threshold, criterion)}</span></div>'
     )
-    return _block(words + _bar(held, threshold, colour))
+    return words + _bar(held, threshold, colour, criterion["maximum"])
 
 
-def _bar(held: float, threshold: float, colour: str) -> str:
-    full = ROOM * max(held, threshold) or 1.0
+def _why_not(snapshot: Snapshot, held: float) -> str:
+    criterion = snapshot["criterion"]
+    if criterion["inclusive"]:
+        return "below" if held < snapshot["threshold"] else "not valid by its value, though not below"
+    return "not above"
+
+
+def _amount(number: float, criterion: Snapshot) -> str:
+    return f"{number:.2f} {_text(criterion['unit'] or criterion['quantity'])}"
+
+
+def _bar(held: float, threshold: float, colour: str, maximum: float | None) -> str:
+    full = maximum or ROOM * max(held, threshold) or 1.0
     return (
         '<div style="position:relative;height:8px;border-radius:4px;margin:4px 0 2px;'
         'background:var(--mantine-color-default-border)">'
@@ -74,6 +96,30 @@ def _bar(held: float, threshold: float, colour: str) -> str:
         f'<div style="position:absolute;left:{100.0 * threshold / full:.1f}%;top:-3px;width:2px;height:14px;'
         'background:var(--mantine-color-text)"></div></div>'
     )
+
+
+def _evidence(snapshot: Snapshot) -> str:
+    """What lines of sight say of the candidate shown, and how well its pose is held."""
+    found, held = snapshot["evidence"], snapshot["uncertainty"]
+    if found is None:
+        return ""
+    colours = map(hexadecimal, PALETTES[snapshot["theme"]].sights)
+    told = "".join(
+        f'<div style="white-space:nowrap"><span style="display:inline-block;width:8px;height:8px;border-radius:4px;'
+        f'background:{colour}"></span> {found[name]:.1f} m {name}</div>'
+        for name, colour in zip(CLASSES, colours, strict=True)
+    )
+    lines = [
+        f'<div style="display:grid;grid-template-columns:1fr 1fr;gap:0 8px;{NUMBERS}">{told}</div>',
+        f'<div style="{FAINT};{NUMBERS}">score {_number(snapshot["score"], 2)} m, '
+        f"value {snapshot['value']:.2f} m</div>",
+    ]
+    if held is not None:
+        heading = _number(math.degrees(held["weak_heading"]), 0)
+        lines.append(
+            f'<div style="{FAINT};{NUMBERS}">weakest direction {heading}°: ± {100.0 * held["weakest"]:.1f} cm</div>'
+        )
+    return "".join(lines)
 
 
 def candidate(snapshot: Snapshot) -> str:
@@ -99,11 +145,13 @@ def _number(number: float, digits: int) -> str:
 
 
 def heuristics(snapshot: Snapshot) -> str:
-    """What each heuristic did on this pair: poses tried, time, best value."""
-    cells = "".join(_heuristic(told) for told in snapshot["heuristics"])
+    """What each heuristic did on this pair: poses tried, time, and how good its best is."""
+    quantity = snapshot["criterion"]["quantity"]
+    cells = "".join(_heuristic(told, quantity) for told in snapshot["heuristics"])
+    best = "Best, m" if quantity == "value" else "Confidence"
     head = "".join(
         f'<th style="text-align:{side};font-weight:500">{word}</th>'
-        for word, side in (("Heuristic", "left"), ("Tried", "right"), ("ms", "right"), ("Best, m", "right"))
+        for word, side in (("Heuristic", "left"), ("Tried", "right"), ("ms", "right"), (best, "right"))
     )
     table = (
         f'<table style="width:100%;border-collapse:collapse;{NUMBERS}"><tr style="{FAINT}">{head}</tr>{cells}</table>'
@@ -115,13 +163,13 @@ def heuristics(snapshot: Snapshot) -> str:
     return _block(table + pose)
 
 
-def _heuristic(told: Mapping[str, Any]) -> str:
+def _heuristic(told: Mapping[str, Any], quantity: str) -> str:
     look = "font-weight:700;background:var(--mantine-color-default-hover)" if told["selected"] else ""
     tried = "–" if told["tried"] is None else f"{told['tried']:,}".replace(",", " ")
     if told["draws"] is not None:
         tried += f"<br><span style='{FAINT};font-weight:400'>of {told['draws']:,} draws</span>".replace(",", " ")
     spent = "–" if told["milliseconds"] is None else f"{told['milliseconds']:.0f}"
-    best = "–" if told["value"] is None else f"{told['value']:.2f}"
+    best = "–" if told[quantity] is None else f"{told[quantity]:.2f}"
     numbers = "".join(f'<td style="text-align:right;padding:1px 0">{cell}</td>' for cell in (tried, spent, best))
     mark = "▸ " if told["selected"] else ""
     return f'<tr style="{look}"><td style="padding:1px 4px 1px 0">{mark}{_text(told["heuristic"])}</td>{numbers}</tr>'

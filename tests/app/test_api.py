@@ -52,14 +52,14 @@ def test_from_a_sample_to_an_exported_map_and_back_after_a_restart(make_client: 
     rows = client.get(f"{url}/integrations").json()["integrations"]
     assert len(rows) == info["counts"]["total"]
     pending = [row for row in rows if row["state"] == "pending"]
-    doubts = [abs(row["value"] - info["threshold"]) for row in pending]
+    doubts = [(row["verdict"] != "review", abs(row["confidence"] - info["threshold"])) for row in pending]
     assert doubts == sorted(doubts)
 
     above = [row["id"] for row in pending if row["above"]]
     revision = decide(client, id, "accepted", *above, who="Ada").json()["revision"]
-    decide(client, id, "rejected", rows[0]["id"], expected_revision=revision)
+    decide(client, id, "rejected", above[0], expected_revision=revision)
     undone = client.post(f"{url}/undo", json={}).json()
-    assert undone["undone"] == f"rejected {rows[0]['id']}"
+    assert undone["undone"] == f"rejected {above[0]}"
     assert session.settle(PATIENCE)
 
     exported = client.get(f"{url}/export/geojson")
@@ -106,12 +106,12 @@ def test_one_integration_in_full(client: Any, project: str) -> None:
     url = f"/api/projects/{project}/integrations/{FIRST}"
     detail = client.get(url).json()
     assert detail["match"]["ranked"][0]["value"] == detail["row"]["value"]
-    assert [found["heuristic"] for found in detail["heuristics"]] == ["all"]
+    assert [found["heuristic"] for found in detail["heuristics"]] == ["automatic"]
     assert client.get(url, params={"heuristic": "histogram"}).json()["match"] is None  # asked for by asking
     client.settle(project)
     detail = client.get(url, params={"heuristic": "histogram"}).json()
     assert detail["match"]["heuristic"] == "histogram"
-    assert [found["heuristic"] for found in detail["heuristics"]] == ["all", "histogram"]
+    assert [found["heuristic"] for found in detail["heuristics"]] == ["automatic", "histogram"]
 
 
 def test_a_conflict_is_answered_with_409(client: Any, project: str) -> None:
@@ -137,6 +137,8 @@ def test_decisions_answer_with_their_rows(client: Any, project: str) -> None:
 def test_the_threshold_and_the_parameters(client: Any, project: str) -> None:
     """A threshold is tried, then set; a preset, a heuristic and single parameters are set in one request."""
     url = f"/api/projects/{project}"
+    assert client.post(f"{url}/parameters", json={"mode": "paper"}).status_code == 200
+    client.settle(project)
     flips = client.get(f"{url}/threshold", params={"value": 0.0}).json()
     rows = client.get(f"{url}/integrations").json()["integrations"]
     assert set(flips["would_pass"]) == {row["id"] for row in rows if row["state"] == "pending" and not row["above"]}
@@ -147,6 +149,35 @@ def test_the_threshold_and_the_parameters(client: Any, project: str) -> None:
     described = client.get("/api/parameters").json()
     assert {entry["name"] for entry in described["parameters"]} == set(info["parameters"])
     assert described["presets"]["paper-lab"]["max_range"] == 8.0
+
+
+def test_new_projects_are_verified_and_can_be_as_the_paper(client: Any, project: str) -> None:
+    """Mode, heuristics, criterion and threshold go together; the threshold is tried on the mode's quantity."""
+    url = f"/api/projects/{project}"
+    info = client.get(url).json()
+    assert (info["mode"], info["modes"], info["heuristic"]) == ("verified", ["paper", "verified"], "automatic")
+    assert info["heuristics"] == ["automatic", "all", "consecutive", "random", "histogram", "extremes"]
+    assert (info["threshold"], info["parameters"]["value_threshold"]) == (0.9, 0.5)
+    told = info["criterion"]
+    assert (told["parameter"], told["quantity"], told["unit"], told["maximum"], told["step"]) == (
+        "confidence_accept",
+        "confidence",
+        "",
+        1.0,
+        0.01,
+    )
+    failing = client.get(f"{url}/threshold", params={"value": 1.0}).json()["would_fail"]
+    rows = client.get(f"{url}/integrations").json()["integrations"]
+    assert set(failing) == {row["id"] for row in rows if row["above"] and row["confidence"] < 1.0}
+    assert "confidence_accept" in failure(client.get(f"{url}/threshold", params={"value": 1.5}), 400)
+    assert client.post(f"{url}/parameters", json={"mode": "paper"}).status_code == 200
+    client.settle(project)
+    info = client.get(url).json()
+    assert (info["mode"], info["heuristic"], info["threshold"]) == ("paper", "all", 4.0)
+    assert info["heuristics"] == ["all", "consecutive", "random", "histogram"]
+    assert (info["criterion"]["quantity"], info["criterion"]["unit"]) == ("value", "m")
+    row = client.get(f"{url}/integrations/{FIRST}").json()["row"]
+    assert (row["confidence"], row["score"], row["above"]) == (None, None, row["value"] > 4.0)
 
 
 def test_matching_is_stopped_and_resumed(make_client: Callable[..., Any], finder: Any, log_bytes: bytes) -> None:
@@ -367,6 +398,8 @@ def test_odd_addresses_are_refused_in_peace(client: Any, project: str, method: s
         ("parameters", {"changes": {"none": 1}}),
         ("parameters", {"preset": "none"}),
         ("parameters", {"heuristic": "guess"}),
+        ("parameters", {"mode": "guess"}),
+        ("parameters", {"mode": "paper", "heuristic": "extremes"}),
         ("parameters", {"changes": [1, 2]}),
         ("matching", {"action": "explode"}),
         ("undo", {"who": 7}),

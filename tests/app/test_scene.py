@@ -285,7 +285,7 @@ def test_names_from_files_and_people_stay_text(view: View) -> None:
             return {name: spoil(held, name) for name, held in value.items()}
         if isinstance(value, list):
             return [spoil(held, key) for held in value]
-        return HOSTILE if isinstance(value, str) and key not in ("theme", "state") else value
+        return HOSTILE if isinstance(value, str) and key not in ("theme", "state", "quantity") else value
 
     view.set_picked("first", 0)
     snapshot = spoil({**view.snapshot(), "messages": ["said"]})
@@ -301,6 +301,29 @@ def test_value_and_threshold_are_told_in_words(view: View) -> None:
     assert "not above the threshold" in read(markup.value({**snapshot, "value": 3.0, "above": False})).text
     assert "2.50 m above the threshold" in read(markup.value({**snapshot, "value": 2.5, "above": True})).text
     assert "No value yet" in read(markup.value({**snapshot, "value": None})).text
+
+
+def test_confidence_and_evidence_are_told_in_words(view: View, session: Session) -> None:
+    """Confidence against its threshold, the evidence in metres, the weakest direction; a rival is called one."""
+    session.configure({}, mode="verified")
+    assert session.settle(PATIENCE)
+    view.select("0.0-0.1")
+    snapshot = view.snapshot()
+    told = read(markup.value(snapshot)).text
+    for words in (
+        "confidence",
+        "the threshold of 0.90",
+        "m supported",
+        "m contradicted",
+        "m unseen",
+        "weakest direction",
+    ):
+        assert words in told
+    assert "0.95 confidence at or above" in read(markup.value({**snapshot, "confidence": 0.95, "above": True})).text
+    assert "0.85 confidence below" in read(markup.value({**snapshot, "confidence": 0.85, "above": False})).text
+    assert "Confidence" in read(markup.heuristics(snapshot)).text
+    view.next_candidate()
+    assert "less than the best" in read(markup.value(view.snapshot())).text
 
 
 def test_heuristics_are_told_with_tries_time_and_value(view: View, session: Session) -> None:
@@ -320,7 +343,9 @@ def test_no_pair_and_no_candidate_are_told(view: View) -> None:
     """An empty project's panel says what there is not."""
     nothing = {
         **view.snapshot(),
-        **dict.fromkeys(("row", "names", "candidate", "value", "pose", "angles", "above", "picked")),
+        **dict.fromkeys(
+            ("row", "names", "candidate", "value", "pose", "angles", "above", "behind", "evidence", "picked")
+        ),
         **{"heuristics": [], "layers": [], "messages": []},
     }
     told = " ".join(read(part(nothing)).text for part in PARTS)

@@ -12,6 +12,7 @@ import pytest
 from app.errors import RequestError, UnknownError
 from app.session import Session
 from segmap.errors import ConflictError, ParameterError, ProjectError, ScanError
+from segmap.events import SetHeuristic
 from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.store import Store
@@ -228,6 +229,71 @@ def test_another_heuristic_for_all(session: Session) -> None:
     assert session.settle(PATIENCE)
     assert session.row(SECOND).heuristic == "consecutive"
     assert (session.row(FIRST).state, session.row(FIRST).heuristic) == ("accepted", "all")
+
+
+def test_the_mode_can_be_changed(session: Session) -> None:
+    """Matches are those of the mode; its heuristic and threshold come with it, unless a person chose others."""
+    before = session.row(FIRST)
+    assert (session.state.mode, before.confidence) == ("paper", None)
+    session.configure({}, mode="verified")
+    assert session.settle(PATIENCE)
+    state, row = session.state, session.row(FIRST)
+    assert (state.mode, state.heuristic, state.parameters.value_threshold) == ("verified", "automatic", 0.5)
+    match = session.match(FIRST)
+    assert match is not None
+    assert (row.heuristic, row.confidence, row.verdict) == ("automatic", match.confidence, match.verdict)
+    session.configure({"value_threshold": 3.0}, heuristic="consecutive")
+    session.configure({}, mode="paper")
+    assert (session.state.heuristic, session.state.parameters.value_threshold) == ("consecutive", 3.0)
+    with pytest.raises(ParameterError):
+        session.match(FIRST, "automatic")
+    for _ in range(5):
+        session.undo()
+    assert session.settle(PATIENCE)
+    assert (session.state.mode, session.row(FIRST)) == ("paper", before)
+
+
+def test_each_mode_keeps_what_it_found(open_session: Open, finder: Any) -> None:
+    """Going to the other mode and back searches nothing twice."""
+    session = _settled(open_session(find=finder))
+    session.configure({}, mode="verified")
+    assert session.settle(PATIENCE)
+    finder.asked.clear()
+    for mode in ("paper", "verified"):
+        session.configure({}, mode=mode)
+        assert session.settle(PATIENCE)
+    assert finder.asked == []
+
+
+def test_another_confidence_searches_nothing_again(open_session: Open, finder: Any) -> None:
+    """In verified mode the threshold lies on the confidence; it judges what was found, and makes no other map."""
+    session = open_session(find=finder)
+    session.configure({}, mode="verified")
+    session.decide([SECOND], "rejected")
+    assert session.settle(PATIENCE)
+    finder.asked.clear()
+    sure = session.row(FIRST).confidence
+    assert session.row(FIRST).above
+    assert sure is not None
+    assert sure < 1.0
+    assert FIRST in session.preview_threshold(1.0).would_fail
+    session.set_parameters({"confidence_accept": 1.0})
+    row, match = session.row(FIRST), session.match(FIRST)
+    assert match is not None
+    assert (row.verdict, row.above, match.verdict) == ("review", False, "review")
+    assert FIRST in session.preview_threshold(sure).would_pass
+    with pytest.raises(ParameterError):
+        session.preview_threshold(1.5)
+    assert session.settle(PATIENCE)
+    assert finder.asked == []
+
+
+def test_a_mode_that_does_not_exist_opens_nothing(project_file: Path) -> None:
+    """A project file that asks for it is refused with a sentence."""
+    with Store.open(project_file) as store:
+        store.append(SetHeuristic(mode="guess"))
+        with pytest.raises(ParameterError, match="no mode 'guess'"):
+            Session("seven", store)
 
 
 def test_impossible_settings_change_nothing(session: Session) -> None:

@@ -14,7 +14,7 @@ from app.drawing import LAYERS, STAGES
 from app.errors import RequestError, UnknownError
 from app.session import Session
 from app.workbench import DOUBLE_CLICK_SECONDS, View
-from segmap.candidates import HEURISTICS
+from segmap.candidates import PAPER_HEURISTICS as HEURISTICS
 from segmap.errors import ConflictError, ProjectError, SegmapError
 
 PATIENCE = 120.0
@@ -109,6 +109,64 @@ def test_candidates_are_stepped_through_by_value_and_end(view: View) -> None:
     assert view.snapshot()["candidate"] == view.snapshot()["candidates"] - 1
     view.set_candidate(-5)
     assert view.snapshot()["candidate"] == 0
+
+
+def test_in_verified_mode_the_evidence_is_told(view: View, session: Session) -> None:
+    """Confidence and verdict of the best, evidence and weakest direction of the one shown; rivals are not judged."""
+    session.configure({}, mode="verified")
+    assert session.settle(PATIENCE)
+    view.select("0.0-0.1")
+    best = view.snapshot()
+    match = session.match("0.0-0.1")
+    assert match is not None
+    assert (best["confidence"], best["verdict"], best["reasons"]) == (
+        match.confidence,
+        match.verdict,
+        list(match.reasons),
+    )
+    assert (best["criterion"]["quantity"], best["threshold"], best["behind"]) == ("confidence", 0.9, 0.0)
+    assert best["above"] == (match.verdict == "accepted")
+    assert set(best["evidence"]) == {"supported", "contradicted", "shadowed", "unseen", "agreement", "overlap"}
+    assert best["uncertainty"]["weakest"] >= best["uncertainty"]["strongest"] > 0.0
+    view.next_candidate()
+    rival = view.snapshot()
+    assert (rival["candidate"], rival["above"]) == (1, None)
+    assert rival["behind"] == pytest.approx(best["score"] - rival["score"])
+    assert rival["behind"] >= 0.0
+
+
+def test_lines_of_sight_are_drawn_at_the_candidate(view: View, session: Session) -> None:
+    """The picture's metres are those of the evidence, in both modes, for every candidate shown."""
+    session.configure({}, mode="verified")
+    assert session.settle(PATIENCE)
+    view.select("0.0-0.1")
+    view.set_stage("candidate")
+    for _ in range(3):
+        pair = view.content().pair
+        assert pair is not None
+        assert pair.candidate is not None
+        assert pair.sights is not None
+        assert pair.candidate.evidence is not None
+        assert vars(pair.sights.evidence) == pytest.approx(vars(pair.candidate.evidence))
+        told = next(layer for layer in view.snapshot()["layers"] if layer["name"] == "sights")
+        assert told["visible"]
+        assert f"supported {pair.sights.evidence.supported:.1f} m" in told["caption"]
+        assert len(told["colours"]) == 4
+        view.next_candidate()
+    session.configure({}, mode="paper")
+    assert session.settle(PATIENCE)
+    assert any(drawable.layer == "sights" for drawable in view.picture().drawables)
+
+
+def test_a_heuristic_the_mode_does_not_have_is_left(view: View, session: Session) -> None:
+    """The view goes back to the project's heuristic when the mode is changed."""
+    session.configure({}, mode="verified")
+    for heuristic in ("all", "consecutive", "random", "histogram", "extremes"):
+        view.next_heuristic()
+        assert view.snapshot()["heuristic"] == heuristic
+    session.configure({}, mode="paper")
+    assert view.snapshot()["heuristic"] == "all"
+    assert [told["heuristic"] for told in view.snapshot()["heuristics"]] == list(HEURISTICS)
 
 
 def test_heuristics_are_stepped_through_and_computed(view: View, session: Session) -> None:
