@@ -16,9 +16,9 @@ from segmap.evaluation import best, evaluate, matching_values
 from segmap.fusion import Fusion, fuse
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
-from segmap.refinement import Uncertainty, information, uncertainty
+from segmap.refinement import Uncertainty, uncertainty
 from segmap.segments import SegmentMap
-from segmap.verdict import Findings, Verdict, confidence, judge
+from segmap.verdict import Findings, Verdict, confidence, findings, judge
 from segmap.verification import Verified, verify
 from segmap.visibility import Evidence, Sighting, evidence, sighting
 
@@ -339,9 +339,7 @@ def _ranked(
             index=int(row),
             score=float(score),
             evidence=evidence(totals),
-            uncertainty=uncertainty(
-                information(task.map_1, task.map_2, seen_1, seen_2, T_1_2, task.parameters), task.parameters
-            ),
+            uncertainty=uncertainty(task.map_1, task.map_2, seen_1, seen_2, T_1_2, task.parameters),
         )
         for row, T_1_2, totals, score in zip(
             kept.rows, (Pose2(*pose) for pose in kept.poses), kept.totals, kept.scores, strict=True
@@ -365,11 +363,10 @@ def _judgement(ranked: tuple[Candidate, ...], parameters: Parameters) -> tuple[V
 
 def _findings(ranked: tuple[Candidate, ...]) -> Findings | None:
     """What speaks for and against the best candidate; None without evidence."""
-    first = ranked[0] if ranked else None
-    if first is None or first.score is None or first.evidence is None or first.uncertainty is None:
+    if not ranked or ranked[0].uncertainty is None:
         return None
-    rival = max((c.score for c in ranked[1:] if c.score is not None), default=0.0)
-    return Findings(first.score, first.score - max(rival, 0.0), first.evidence, first.uncertainty.weakest)
+    judged = [(c.score, c.evidence) for c in ranked if c.score is not None and c.evidence is not None]
+    return findings(judged, ranked[0].uncertainty.weakest)
 
 
 def findings_of(match: Match) -> Findings | None:
@@ -378,8 +375,8 @@ def findings_of(match: Match) -> Findings | None:
 
 
 def _confidence(ranked: tuple[Candidate, ...]) -> float:
-    findings = _findings(ranked)
-    return 0.0 if findings is None else confidence(findings)
+    found = _findings(ranked)
+    return 0.0 if found is None else confidence(found)
 
 
 def _why_none(found: _Found, task: _Task) -> str:

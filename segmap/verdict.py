@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 from segmap.parameters import Parameters
 from segmap.visibility import Evidence
 
-__all__ = ["CALIBRATION", "Findings", "Verdict", "confidence", "features", "judge", "judge_evidence", "judge_value"]
+__all__ = [
+    "CALIBRATION",
+    "Findings",
+    "Verdict",
+    "confidence",
+    "features",
+    "findings",
+    "judge",
+    "judge_evidence",
+    "judge_value",
+]
 
 
 class Verdict(StrEnum):
@@ -31,6 +42,25 @@ class Findings:
     evidence: Evidence
     weakest: float
     """metres: standard deviation along the weakest direction"""
+    unrefuted: float = 0.0
+    """metres: the score of the best rival that agrees with what both maps see as well as the best candidate does"""
+
+
+AS_WELL = 0.05
+"""a rival agrees as well when its agreement is at most this much less"""
+RIVAL_SHARE = 0.7
+"""an unrefuted rival with more than this share of the score leaves the choice to a person"""
+CLOSE_SHARE = 0.8
+"""and so does any rival with more than this share"""
+
+
+def findings(judged: Sequence[tuple[float, Evidence]], weakest: float) -> Findings:
+    """What the scores and the evidence of distinct candidates, best first, say of the first."""
+    (best, seen), rivals = judged[0], judged[1:]
+    nearest = max((score for score, _ in rivals), default=0.0)
+    as_well = seen.agreement - AS_WELL
+    unrefuted = max((score for score, evidence in rivals if evidence.agreement >= as_well), default=0.0)
+    return Findings(best, best - max(nearest, 0.0), seen, weakest, max(unrefuted, 0.0))
 
 
 CALIBRATION: dict[str, float] = {
@@ -76,15 +106,21 @@ def judge_value(value: float, parameters: Parameters) -> tuple[Verdict, tuple[st
 
 
 def judge_evidence(value: float, findings: Findings, parameters: Parameters) -> tuple[Verdict, tuple[str, ...]]:
-    """The verdict on evidence: enough confidence, and a value above the threshold too."""
+    """The verdict on evidence: enough confidence, no doubt of a kind that confidence cannot weigh, and a value
+    above the threshold too.
+
+    Whatever the confidence, a person decides where a rival might as well be right, and where no wall holds
+    the pose along some direction, as in a corridor.
+    """
     sure = confidence(findings)
-    reasons = (_certainty(sure, parameters), *_grounds(findings, parameters))
+    doubts = _doubts(findings, parameters)
     verdict, value_reasons = judge_value(value, parameters)
+    reasons = (_certainty(sure, parameters), *doubts, _seen(findings.evidence), *value_reasons)
     if sure < parameters.confidence_review or (verdict is Verdict.REJECTED and sure < parameters.confidence_accept):
-        return Verdict.REJECTED, (*reasons, *value_reasons)
-    if sure >= parameters.confidence_accept and verdict is Verdict.ACCEPTED:
-        return Verdict.ACCEPTED, (*reasons, *value_reasons)
-    return Verdict.REVIEW, (*reasons, *value_reasons)
+        return Verdict.REJECTED, reasons
+    if sure >= parameters.confidence_accept and verdict is Verdict.ACCEPTED and not doubts:
+        return Verdict.ACCEPTED, reasons
+    return Verdict.REVIEW, reasons
 
 
 def _certainty(sure: float, parameters: Parameters) -> str:
@@ -95,13 +131,21 @@ def _certainty(sure: float, parameters: Parameters) -> str:
     return f"Confidence {sure:.3f}: below {parameters.confidence_review:g}."
 
 
-def _grounds(findings: Findings, parameters: Parameters) -> tuple[str, ...]:
-    """The evidence in words, the weightiest doubt first."""
-    seen = findings.evidence
-    against = seen.contradicted + seen.shadowed
-    grounds = [f"{seen.supported:.1f} m are seen by both, {against:.1f} m contradict, {seen.unseen:.1f} m are unseen."]
-    if findings.gap < 0.2 * max(findings.score, 1.0):
-        grounds.insert(0, f"A distinct rival scores only {findings.gap:.2f} m less: look at the rivals.")
+def _doubts(findings: Findings, parameters: Parameters) -> tuple[str, ...]:
+    """What leaves the choice to a person, in words."""
+    doubts = []
+    if findings.score - findings.gap > max(0.0, CLOSE_SHARE * findings.score):
+        doubts.append(f"A distinct rival scores only {findings.gap:.2f} m less: look at the rivals.")
+    elif findings.unrefuted > max(0.0, RIVAL_SHARE * findings.score):
+        less = findings.score - findings.unrefuted
+        doubts.append(f"A distinct rival scores {less:.2f} m less, but nothing speaks against it: look at the rivals.")
     if findings.weakest > parameters.rival_distance / 2.0:
-        grounds.append(f"Along its weakest direction the pose is known only to {findings.weakest:.2f} m.")
-    return tuple(grounds)
+        doubts.append(f"Along its weakest direction the pose is known only to {findings.weakest:.2f} m.")
+    return tuple(doubts)
+
+
+def _seen(evidence: Evidence) -> str:
+    against = evidence.contradicted + evidence.shadowed
+    return (
+        f"{evidence.supported:.1f} m are seen by both, {against:.1f} m contradict, {evidence.unseen:.1f} m are unseen."
+    )
