@@ -252,8 +252,7 @@ class Session:
     ) -> Change:
         """Change parameters, from those in force or from a preset, the heuristic and the mode; all or nothing.
 
-        Another mode brings its own heuristic and its own threshold of the value, where those of the mode
-        before stood at their defaults.
+        Another mode brings its own heuristic and threshold of the value, where those before were the defaults.
 
         Raises:
             ParameterError: a name is unknown, or a value impossible.

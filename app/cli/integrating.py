@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Annotated, Any
 
 import typer
@@ -18,7 +20,7 @@ from app.cli.options import (
     read,
 )
 from app.cli.output import pose_json, print_facts, print_json, show_pose
-from segmap.integration import Match, match_maps
+from segmap.integration import Candidate, Match, match_maps
 from segmap.segments import extract
 
 __all__ = ["integrate"]
@@ -60,6 +62,22 @@ def _document(match: Match) -> dict[str, Any]:
         "chains": [[list(pair[:2]) for pair in chain.pairs] for chain in match.chains],
         "segments": list(match.segments),
         "milliseconds": match.milliseconds,
+        **({} if match.confidence is None or match.best is None else _verified(match.best, match.ranked[1:])),
+    }
+
+
+def _verified(best: Candidate, rivals: Sequence[Candidate]) -> dict[str, Any]:
+    """What verified mode knows of the best candidate, and of its distinct rivals."""
+    told = [{"pose": pose_json(rival.T_1_2), "value": rival.value, **_grounds(rival)} for rival in rivals]
+    return {**_grounds(best), "rivals": told}
+
+
+def _grounds(candidate: Candidate) -> dict[str, Any]:
+    seen, held = candidate.evidence, candidate.uncertainty
+    return {
+        "score": candidate.score,
+        "evidence": None if seen is None else {**asdict(seen), "agreement": seen.agreement, "overlap": seen.overlap},
+        "uncertainty": None if held is None else asdict(held),
     }
 
 

@@ -178,5 +178,6 @@ def _integration(pair: tuple[ScanId, ScanId], match: Match) -> dict[str, Any]:
         "id": str(IntegrationId(*pair)),
         "pose": pose_json(match.T_1_2),
         "value": match.value,
+        "confidence": match.confidence,
         "verdict": str(match.verdict),
     }

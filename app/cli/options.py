@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, TypeAlias
@@ -10,7 +10,7 @@ from typing import Annotated, TypeAlias
 import typer
 
 from segmap.errors import ParameterError
-from segmap.integration import DEFAULT_HEURISTIC, MODES, heuristics
+from segmap.integration import DEFAULT_HEURISTIC, DEFAULT_PRESET, MODES, chosen_heuristic, heuristics
 from segmap.logs import read_log
 from segmap.parameters import PRESETS, Parameters, preset
 from segmap.scans import LaserLog
@@ -37,7 +37,18 @@ def one_of(names: Iterable[str]) -> str:
 
 
 DEFAULT_MODE = "verified"
-DEFAULT_PRESET = "default"
+PLAIN_PRESET = "default"
+"""where there is no mode"""
+
+
+def _by_mode(defaults: Mapping[str, str]) -> str:
+    """Defaults in words.
+
+    >>> _by_mode({"paper": "all"})
+    'all in paper mode'
+    """
+    return ", ".join(f"{name} in {mode} mode" for mode, name in defaults.items())
+
 
 Log: TypeAlias = Annotated[
     Path, typer.Argument(metavar="LOG", help="A laser log, plain or gzipped.", show_default=False)
@@ -48,10 +59,14 @@ Mode: TypeAlias = Annotated[
 ]
 Heuristic: TypeAlias = Annotated[
     str | None,
-    typer.Option(metavar=one_of(heuristics(DEFAULT_MODE)), help="Which candidates are tried; default: the mode's own."),
+    typer.Option(
+        metavar=one_of(heuristics(DEFAULT_MODE)),
+        help=f"Which candidates are tried; default: {_by_mode(DEFAULT_HEURISTIC)}.",
+    ),
 ]
 Preset: TypeAlias = Annotated[
-    str | None, typer.Option(metavar=one_of(PRESETS), help="The parameters to start from; default: the mode's own.")
+    str | None,
+    typer.Option(metavar=one_of(PRESETS), help=f"The parameters to start from; default: {_by_mode(DEFAULT_PRESET)}."),
 ]
 Setting: TypeAlias = Annotated[
     list[str] | None,
@@ -74,13 +89,8 @@ def method_of(mode: str, heuristic: str | None, preset_name: str | None, setting
     Raises:
         ParameterError: there is no such mode, heuristic, preset or parameter, or a value is impossible.
     """
-    if mode not in MODES:
-        raise ParameterError(f"There is no mode {mode!r}. Modes are: {', '.join(MODES)}.")
-    known = heuristics(mode)
-    if heuristic is not None and heuristic not in known:
-        raise ParameterError(f"There is no heuristic {heuristic!r} in {mode} mode. Heuristics are: {', '.join(known)}.")
-    own = mode if mode in PRESETS else DEFAULT_PRESET
-    return Method(parameters_of(preset_name or own, settings), heuristic or DEFAULT_HEURISTIC[mode], mode)
+    chosen = chosen_heuristic(mode, heuristic)
+    return Method(parameters_of(preset_name or DEFAULT_PRESET[mode], settings), chosen, mode)
 
 
 def parameters_of(preset_name: str | None, settings: list[str] | None) -> Parameters:
@@ -90,7 +100,7 @@ def parameters_of(preset_name: str | None, settings: list[str] | None) -> Parame
         ParameterError: a change is not NAME=VALUE, or cannot be made.
     """
     changes = [_assignment(text) for text in settings or []]
-    return preset(preset_name or DEFAULT_PRESET).with_text(dict(changes))
+    return preset(preset_name or PLAIN_PRESET).with_text(dict(changes))
 
 
 def _assignment(text: str) -> tuple[str, str]:

@@ -99,6 +99,10 @@ def test_help_names_every_command_and_every_command_has_help(run: Run) -> None:
             ("integrate", HALL, "0", "1", "--mode", "paper", "--heuristic", "automatic"),
             "in paper mode. Heuristics are: all",
         ),
+        (
+            ("integrate", HALL, "0", "1", "--mode", "paper", "--heuristic", "extremes"),
+            "no heuristic 'extremes' in paper mode. Heuristics are: all, consecutive, random, histogram.",
+        ),
         (("integrate", HALL, "0", "1", "--mode", "guess"), "There is no mode 'guess'. Modes are: paper"),
         (("integrate", HALL, "0", "1", "--preset", "mine"), "There is no preset 'mine'. Presets are: default"),
         (("integrate", HALL, "0", "1", "--set", "taus=1"), "There is no parameter 'taus'"),
@@ -233,6 +237,21 @@ def test_each_mode_has_its_own_defaults(document: Callable[..., Any]) -> None:
         assert (told["value"], told["verdict"]) == (match.value, match.verdict)
         assert told["reasons"] == list(match.reasons)
         assert told["confidence"] == match.confidence
+
+
+def test_integrate_tells_the_evidence(document: Callable[..., Any]) -> None:
+    """Score, evidence in metres and uncertainty of the best and of its rivals; nothing of it in paper mode."""
+    told = document("integrate", OFFICE, 20, 21)
+    maps = [extract(read_log(OFFICE).scan(i), Parameters(), index=i) for i in (20, 21)]
+    best, *rivals = match_maps(maps[0], maps[1], preset("verified"), None, "verified").ranked
+    assert best.evidence is not None
+    assert best.uncertainty is not None
+    assert (told["score"], told["evidence"]["supported"]) == (best.score, best.evidence.supported)
+    assert told["evidence"]["agreement"] == best.evidence.agreement
+    assert told["uncertainty"]["weakest"] == best.uncertainty.weakest
+    assert [rival["score"] for rival in told["rivals"]] == [rival.score for rival in rivals]
+    assert all(set(rival["evidence"]) == set(told["evidence"]) for rival in told["rivals"])
+    assert not {"score", "evidence", "rivals"} & set(document("integrate", OFFICE, 20, 21, "--mode", "paper"))
 
 
 def test_integrate_finds_where_the_robot_went(document: Callable[..., Any]) -> None:
