@@ -7,6 +7,7 @@ const MOST = 500;
 const COLUMNS = [
   { label: "#", title: "rank by value", of: (c) => c.rank, show: (c) => c.rank + 1 },
   { label: "value", title: "value of the transformation, metres", of: (c) => -c.value, show: (c) => fixed(c.value, 2) },
+  { label: "score", title: "support of lines of sight less conflict, metres", of: (c) => -c.score, show: (c) => fixed(c.score, 2) },
   { label: "x", title: "metres", of: (c) => c.pose.x, show: (c) => fixed(c.pose.x, 2) },
   { label: "y", title: "metres", of: (c) => c.pose.y, show: (c) => fixed(c.pose.y, 2) },
   { label: "θ°", title: "degrees", of: (c) => c.pose.theta, show: (c) => degrees(c.pose.theta) },
@@ -21,6 +22,7 @@ export class Candidates {
   constructor() {
     this.body = byId("candidates-body");
     fill(byId("candidates-head"), COLUMNS.map((column, index) => this.#header(column, index)));
+    this.table = byId("candidates-table");
     this.body.addEventListener("click", (event) => this.#choose(event.target.closest("tr")));
     this.body.addEventListener("keydown", (event) => this.#key(event));
   }
@@ -29,7 +31,8 @@ export class Candidates {
     this.view = view;
     this.#candidates = (match?.ranked ?? []).map((found, rank) => ({ ...found, rank, pose: pose(found.T_1_2) }));
     text(byId("candidates-note"), note(match, this.#candidates.length));
-    byId("candidates-table").hidden = this.#candidates.length === 0;
+    this.table.hidden = this.#candidates.length === 0;
+    this.table.classList.toggle("unscored", match?.mode === "paper");
     this.#draw();
   }
 

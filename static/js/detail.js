@@ -1,7 +1,7 @@
 // The selected integration: what was found, by which heuristic, and why. Feeds the candidate and heuristics tables.
 
 import { byId, fill, h, icon, setIcon, text } from "./dom.js";
-import { pair, metres } from "./format.js";
+import { measured, pair } from "./format.js";
 import { stateIcon, stateLabel } from "./queue.js";
 
 export class Detail {
@@ -46,10 +46,17 @@ export class Detail {
     byId("detail").hidden = row === null;
     if (!row) return;
     text(byId("detail-pair"), pair(row.id));
-    byId("detail-state").dataset.state = row.state;
+    Object.assign(byId("detail-state").dataset, { state: row.state, verdict: row.verdict ?? "" });
     setIcon(byId("detail-state").firstElementChild, stateIcon(row.state));
-    text(byId("detail-state").lastElementChild, decidedBy(row));
+    text(byId("detail-state").lastElementChild, this.#decided(row));
     this.#clearing(row);
+  }
+
+  #decided(row) {
+    const { quantity, unit } = this.project.criterion;
+    const number = this.project.quantity(row);
+    const said = number === null || row.state === "none" ? "" : unit ? `, ${measured(number, unit)}` : `, ${quantity} ${measured(number, unit)}`;
+    return `${stateLabel(row.state)}${row.who ? ` by ${row.who}` : ""}${said}`;
   }
 
   #clearing(row) {
@@ -67,11 +74,6 @@ export class Detail {
 /** Fill the place of the state with an icon and a text to be set later. */
 export function prepare(element) {
   fill(element, icon("open"), h("span"));
-}
-
-function decidedBy(row) {
-  const value = row.value ? `, ${metres(row.value)}` : "";
-  return `${stateLabel(row.state)}${row.who ? ` by ${row.who}` : ""}${value}`;
 }
 
 function decisionReason(row) {

@@ -14,6 +14,7 @@ const SPANS = [
 export const whole = (value) => (isNumber(value) ? WHOLE.format(value).replaceAll(",", "\u202f") : MISSING);
 export const fixed = (value, digits) => (isNumber(value) ? signed(value.toFixed(digits)) : MISSING);
 export const metres = (value, digits = 2) => (isNumber(value) ? `${fixed(value, digits)} m` : MISSING);
+export const measured = (value, unit) => (unit ? `${fixed(value, 2)} ${unit}` : fixed(value, 2));
 export const degrees = (radians) => (isNumber(radians) ? fixed((radians * 180) / Math.PI, 1) : MISSING);
 
 /** "1 scan", "12 scans". */

@@ -1,7 +1,7 @@
 // The heuristics on the selected pair: what each tried, how long it took, and what it found.
 
-import { byId, fill, h } from "./dom.js";
-import { degrees, duration, fixed, metres, pose, whole } from "./format.js";
+import { byId, fill, h, text } from "./dom.js";
+import { degrees, duration, fixed, measured, pose, whole } from "./format.js";
 
 export class Heuristics {
   constructor(project) {
@@ -16,8 +16,10 @@ export class Heuristics {
   show({ heuristics }, view) {
     this.view = view;
     const known = new Map(heuristics.map((found) => [found.heuristic, found]));
-    const best = Math.max(0, ...heuristics.map((found) => found.value ?? 0));
-    fill(this.body, this.project.info.heuristics.map((name) => line(name, known.get(name), best)));
+    const { criterion } = this.project;
+    const best = Math.max(0, ...heuristics.map((found) => found[criterion.quantity] ?? 0));
+    text(byId("heuristics-quantity"), criterion.quantity);
+    fill(this.body, this.project.info.heuristics.map((name) => line(name, known.get(name), criterion, best)));
     this.mark(view);
   }
 
@@ -48,10 +50,11 @@ export class Heuristics {
   }
 }
 
-function line(name, found, best) {
+function line(name, found, { quantity, unit }, best) {
   const title = h("th", { scope: "row" }, name);
   if (!found) return h("tr", { "data-heuristic": name }, title, h("td.untried", { colspan: 3 }, "not tried yet: select it to try it"));
-  const value = h("td", { class: found.value > 0 && found.value === best ? "best" : null }, found.pose ? metres(found.value) : "none");
+  const number = found[quantity];
+  const value = h("td", { class: number > 0 && number === best ? "best" : null }, found.pose ? measured(number, unit) : "none");
   const draws = found.draws === null ? null : h("span.more", {}, `${whole(found.draws)} draws`);
   title.append(h("span.more", {}, where(found.pose)));
   return h("tr", { "data-heuristic": name }, title, h("td", {}, whole(found.candidates), draws), h("td", {}, duration(found.milliseconds)), value);

@@ -7,6 +7,8 @@ const MERGING_PAUSE = 500;
 const REDRAW_PAUSE = 250;
 const DECISION_PAUSE = 60;
 
+const VALUE = { parameter: "value_threshold", quantity: "value", unit: "m", maximum: null, step: 0.05 };
+
 /** Tells "info", "rows", "progress", "match", "map", "parameters" and "trouble" as events. */
 export class Project extends EventTarget {
   constructor(id) {
@@ -34,9 +36,19 @@ export class Project extends EventTarget {
     return this.index.get(id) ?? null;
   }
 
-  /** The ids of the rows in a state. */
-  ids(state) {
-    return this.rows.filter((row) => row.state === state).map((row) => row.id);
+  /** The rows a person can decide. */
+  get undecided() {
+    return this.rows.filter((row) => row.state === "pending");
+  }
+
+  /** What the threshold is about: the value in metres, or the confidence. */
+  get criterion() {
+    return this.info?.criterion ?? VALUE;
+  }
+
+  /** The number of a row that the threshold is about; null where it is not known. */
+  quantity(row) {
+    return row[this.criterion.quantity] ?? null;
   }
 
   detail(id, heuristic, signal) {

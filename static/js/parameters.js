@@ -20,7 +20,7 @@ export class ParameterDrawer {
     this.form.addEventListener("submit", (event) => (event.preventDefault(), this.#apply()));
     byId("parameters-preset").addEventListener("change", (event) => this.#take(this.#presets[event.target.value]));
     byId("parameters-revert").addEventListener("click", () => this.#fill());
-    project.addEventListener("info", () => this.dialog.open && this.#changes().size === 0 && this.#fill());
+    project.addEventListener("info", () => this.dialog.open && this.#number() === 0 && this.#fill());
   }
 
   async toggle() {
@@ -35,7 +35,6 @@ export class ParameterDrawer {
     const { parameters, presets } = await get("/api/parameters");
     this.#presets = presets;
     fill(byId("parameters-preset"), h("option", { value: "" }, "Values of a preset…"), options(Object.keys(presets)));
-    fill(byId("parameters-heuristic"), options(this.project.info.heuristics));
     fill(byId("parameters-list"), parameters.map((parameter) => this.#field(parameter)));
   }
 
@@ -50,8 +49,10 @@ export class ParameterDrawer {
   }
 
   #fill() {
-    this.#take(this.project.info.parameters);
-    byId("parameters-heuristic").value = this.project.info.heuristic;
+    const { parameters, mode, modes, heuristic, heuristics } = this.project.info;
+    this.#take(parameters);
+    fill(byId("parameters-mode"), options(modes)).value = mode;
+    fill(byId("parameters-heuristic"), options(heuristics)).value = heuristic;
     byId("parameters-preset").value = "";
     this.#complain("");
     this.#changed();
@@ -75,25 +76,31 @@ export class ParameterDrawer {
     return changes;
   }
 
+  /** Another mode, which brings its own heuristic, or another heuristic of this mode. */
+  #method() {
+    const [mode, heuristic] = [byId("parameters-mode").value, byId("parameters-heuristic").value];
+    if (mode !== this.project.info.mode) return { mode };
+    return heuristic === this.project.info.heuristic ? {} : { heuristic };
+  }
+
+  #number() {
+    return this.#changes().size + Object.keys(this.#method()).length;
+  }
+
   #changed() {
     const changes = this.#changes();
     for (const [name, { input }] of this.#fields) set(input.closest("li"), "data-changed", changes.has(name));
-    const heuristic = byId("parameters-heuristic").value !== this.project.info.heuristic;
-    const number = changes.size + (heuristic ? 1 : 0);
+    byId("parameters-heuristic").disabled = byId("parameters-mode").value !== this.project.info.mode;
+    const number = this.#number();
     text(byId("parameters-apply"), number ? `Apply ${count(number, "change")}` : "Apply");
     for (const id of ["parameters-apply", "parameters-revert"]) byId(id).disabled = number === 0;
   }
 
   async #apply() {
-    const heuristic = byId("parameters-heuristic").value;
-    const body = { changes: Object.fromEntries(this.#changes()) };
-    if (heuristic !== this.project.info.heuristic) body.heuristic = heuristic;
     try {
-      await this.project.setParameters(body);
-      Object.assign(this.project.info.parameters, body.changes);
-      this.project.info.heuristic = heuristic;
-      this.#complain("");
-      this.#changed();
+      await this.project.setParameters({ changes: Object.fromEntries(this.#changes()), ...this.#method() });
+      await this.project.load();
+      this.#fill();
     } catch (error) {
       this.#complain(error.message);
     }

@@ -1,7 +1,7 @@
 // The review queue: the integrations in the server's order, the one that most needs a person first.
 
 import { byId, fill, h, icon, set, setIcon, text } from "./dom.js";
-import { count, metres, pair, whole } from "./format.js";
+import { count, measured, pair, whole } from "./format.js";
 import { VirtualList } from "./virtual.js";
 
 const HEIGHT = 34;
@@ -52,7 +52,7 @@ export class Queue {
     const test = FILTERS.find(([name]) => name === this.#filter)[2];
     this.#shown = this.project.rows.filter((row) => test(row) && found(row, this.#search));
     this.#threshold = this.project.info?.threshold ?? 0;
-    this.#scale = scale(this.project.rows, this.#threshold);
+    this.#scale = this.project.criterion.maximum ?? scale(this.project, this.#threshold);
     this.list.show(this.#shown, this.view.integration);
     this.#chips();
     this.#needs();
@@ -61,8 +61,8 @@ export class Queue {
   }
 
   /** Mark the rows another threshold would flip. */
-  preview(passes, fails) {
-    this.#flips = { passes: new Set(passes), fails: new Set(fails) };
+  preview(flips) {
+    this.#flips = flips;
     this.list.show(this.#shown, this.view.integration);
   }
 
@@ -116,9 +116,11 @@ export class Queue {
   }
 
   #needs() {
-    const [waiting, running] = ["pending", "matching"].map((state) => this.project.ids(state).length);
-    const all = this.project.rows.length;
-    text(byId("need"), waiting + running ? `${whole(waiting)} of ${whole(all)} need you` : all ? "Everything is decided" : "");
+    const { rows, undecided } = this.project;
+    const doubtful = undecided.filter((row) => row.verdict === "review");
+    const need = rows.some((row) => row.verdict === "review") ? doubtful : undecided;
+    const open = undecided.length > 0 || rows.some((row) => row.state === "matching");
+    text(byId("need"), open ? `${whole(need.length)} of ${whole(rows.length)} need you` : rows.length ? "Everything is decided" : "");
   }
 
   #find(words) {
@@ -158,13 +160,14 @@ export class Queue {
 
   #draw(element, row) {
     const [state, id, bar, value, note] = element.children;
-    Object.assign(element.dataset, { id: row.id, state: row.state });
+    Object.assign(element.dataset, { id: row.id, state: row.state, verdict: row.verdict ?? "" });
     element.id = `row-${row.id}`;
     setIcon(state.firstElementChild, stateIcon(row.state));
     text(state.lastElementChild, stateLabel(row.state));
     text(id, pair(row.id));
-    drawBar(bar, row, this.#scale, this.#threshold);
-    text(value, row.value ? metres(row.value) : "");
+    const quantity = row.state === "none" ? null : this.project.quantity(row);
+    drawBar(bar, quantity, this.#scale, this.#threshold);
+    text(value, quantity === null ? "" : measured(quantity, this.project.criterion.unit));
     this.#note(note, row);
     set(element, "aria-selected", String(row.id === this.view.integration));
   }
@@ -172,10 +175,11 @@ export class Queue {
   #note(note, row) {
     const flip = this.#flips.passes.has(row.id) ? "would pass" : this.#flips.fails.has(row.id) ? "would fail" : "";
     note.className = flip ? `note ${flip.replace(" ", "-")}` : "note";
-    text(note, flip || (row.state === "pending" ? row.heuristic : SHORT[row.state] ?? row.heuristic));
+    text(note, flip || (row.state === "pending" ? PROPOSALS[row.verdict] : SHORT[row.state]) || row.heuristic);
   }
 }
 
+const PROPOSALS = { accepted: "→ accept", review: "→ look", rejected: "→ reject" };
 const SHORT = { none: "none found", failed: "failed", matching: "matching" };
 
 function makeRow() {
@@ -184,15 +188,16 @@ function makeRow() {
   return h("div.item", { role: "option" }, state, h("span.pair"), bar, h("span.value"), h("span.note"));
 }
 
-function drawBar(bar, row, scale, threshold) {
-  const share = Math.min(1, (row.value ?? 0) / scale);
+function drawBar(bar, quantity, scale, threshold) {
+  bar.hidden = quantity === null;
+  const share = Math.min(1, (quantity ?? 0) / scale);
   bar.firstElementChild.style.width = `${100 * share}%`;
   bar.lastElementChild.style.left = `${100 * Math.min(1, threshold / scale)}%`;
 }
 
-/** Metres at the right end of the bars: what all but the highest few values fit into. */
-function scale(rows, threshold) {
-  const values = rows.map((row) => row.value ?? 0).sort((a, b) => a - b);
+/** What stands at the right end of the bars: all but the highest few numbers fit. */
+function scale(project, threshold) {
+  const values = project.rows.map((row) => project.quantity(row) ?? 0).sort((a, b) => a - b);
   return Math.max(2 * threshold, values[Math.floor(0.95 * (values.length - 1))] ?? 0, 0.01);
 }
 

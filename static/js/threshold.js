@@ -1,15 +1,18 @@
 // The threshold: what it would flip is shown before it is let go; decisions in bulk above and below it.
 
 import { byId, fill, h, text } from "./dom.js";
-import { count, metres, some, whole } from "./format.js";
+import { count, some, whole } from "./format.js";
 import { failed, notice } from "./notices.js";
 
 const PAUSE = 80;
 const BINS = 48;
+const MOST = 100000;
+const NO_FLIPS = { passes: new Set(), fails: new Set() };
 
 export class Threshold {
   #asking = null;
   #timer = 0;
+  #flips = NO_FLIPS;
 
   constructor(project, queue) {
     Object.assign(this, { project, queue });
@@ -31,31 +34,34 @@ export class Threshold {
   /** The threshold of the project changed, by us or by somebody else; a slider that is held stays. */
   #moved() {
     if (this.#asking !== null) return;
-    const { threshold } = this.project.info;
-    this.slider.max = Math.max(2 * threshold, Number(this.slider.max));
-    this.slider.value = threshold;
-    if (document.activeElement !== this.exact) this.exact.value = threshold.toFixed(2);
+    const { quantity, unit, step, maximum } = this.project.criterion;
+    text(byId("threshold-title").firstElementChild, `Threshold of ${quantity}`);
+    text(byId("threshold-unit"), unit);
+    this.slider.step = step;
+    this.exact.max = maximum ?? MOST;
+    if (document.activeElement !== this.exact) this.exact.value = this.project.info.threshold.toFixed(2);
     this.#draw();
   }
 
   #draw() {
     if (!this.project.info) return;
-    const values = this.project.rows.filter((row) => row.state !== "none" && row.value > 0).map((row) => row.value);
-    if (this.#asking === null) this.slider.max = reach(values, this.project.info.threshold);
+    const found = this.project.rows.filter((row) => row.state !== "none").map((row) => this.project.quantity(row));
+    const numbers = found.filter((number) => number !== null);
+    if (this.#asking === null) this.slider.max = this.project.criterion.maximum ?? reach(numbers, this.project.info.threshold);
     this.slider.value = this.value;
-    this.#histogram(values);
+    this.#histogram(numbers);
     this.#buttons();
   }
 
-  #histogram(values) {
+  #histogram(numbers) {
     const most = Number(this.slider.max);
     const bins = new Array(BINS).fill(0);
-    for (const value of values) bins[Math.min(BINS - 1, Math.floor((value / most) * BINS))] += 1;
+    for (const number of numbers) bins[Math.min(BINS - 1, Math.floor((number / most) * BINS))] += 1;
     const highest = Math.max(1, ...bins);
     const box = byId("threshold-histogram");
     while (box.children.length < BINS) box.append(h("i"));
     bins.forEach((number, index) => {
-      box.children[index].style.height = number ? `${Math.max(8, (100 * number) / highest)}%` : "0";
+      box.children[index].style.height = number ? `${Math.max(8, 100 * Math.sqrt(number / highest))}%` : "0";
       box.children[index].className = ((index + 0.5) / BINS) * most > this.value ? "above" : "";
     });
   }
@@ -71,11 +77,15 @@ export class Threshold {
     byId(id).disabled = number === 0;
   }
 
-  /** Undecided integrations with a transformation, on both sides of the value shown. */
+  /** Undecided integrations the program would accept or reject under the threshold shown; the doubtful are in neither. */
   #sides() {
-    const undecided = this.project.rows.filter((row) => row.state === "pending" && row.value !== null);
-    const above = undecided.filter((row) => row.value > this.value).map((row) => row.id);
-    return { above, below: undecided.filter((row) => row.value <= this.value).map((row) => row.id) };
+    const { passes, fails } = this.#flips;
+    const accepted = (row) => passes.has(row.id) || (row.above && !fails.has(row.id));
+    const rejected = (row) => row.verdict === "rejected" || (fails.has(row.id) && this.project.criterion.quantity === "value");
+    const { undecided } = this.project;
+    const above = undecided.filter(accepted);
+    const below = undecided.filter((row) => !accepted(row) && rejected(row));
+    return { above: above.map((row) => row.id), below: below.map((row) => row.id) };
   }
 
   #preview(value) {
@@ -90,16 +100,22 @@ export class Threshold {
   async #ask(value, asking) {
     try {
       const flips = await this.project.flips(value, asking.signal);
-      if (asking === this.#asking) this.#show(flips);
+      if (asking === this.#asking) this.#show(flips.would_pass, flips.would_fail);
     } catch (error) {
       failed(error);
     }
   }
 
-  #show({ would_pass: passes, would_fail: fails }) {
+  #show(passes, fails) {
     const parts = [part("would-pass", passes, "would pass"), part("would-fail", fails, "would no longer pass")].filter(Boolean);
     fill(byId("threshold-preview"), parts.length ? parts : "No undecided integration would flip.");
-    this.queue.preview(passes, fails);
+    this.#flip(passes, fails);
+  }
+
+  #flip(passes, fails) {
+    this.#flips = { passes: new Set(passes), fails: new Set(fails) };
+    this.queue.preview(this.#flips);
+    this.#buttons();
   }
 
   async #set(value) {
@@ -107,7 +123,7 @@ export class Threshold {
     if (value === this.project.info.threshold) return this.#moved();
     this.project.info.threshold = value;
     try {
-      await this.project.setParameters({ changes: { value_threshold: value } });
+      await this.project.setParameters({ changes: { [this.project.criterion.parameter]: value } });
     } catch (error) {
       failed(error);
     }
@@ -119,7 +135,7 @@ export class Threshold {
     this.#asking?.abort();
     this.#asking = null;
     fill(byId("threshold-preview"));
-    this.queue.preview([], []);
+    this.#flip([], []);
   }
 
   async #decide(verdict) {
@@ -127,9 +143,8 @@ export class Threshold {
     const ids = verdict === "accepted" ? above : below;
     try {
       await this.project.decide(ids, verdict);
-      const side = verdict === "accepted" ? "above" : "not above";
-      const message = `${verdict === "accepted" ? "Accepted" : "Rejected"} ${count(ids.length, "integration")} ${side} ${metres(this.value)}.`;
-      notice(message, { action: { label: "Undo", run: () => this.project.undo().catch(failed) } });
+      const word = verdict === "accepted" ? "Accepted" : "Rejected";
+      notice(`${word} ${count(ids.length, "integration")}.`, { action: { label: "Undo", run: () => this.project.undo().catch(failed) } });
     } catch (error) {
       failed(error);
     }

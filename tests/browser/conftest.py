@@ -26,7 +26,7 @@ SERVE = (
 STARTED = re.compile(r"segmap is at (http://\S+?)/ ")
 START_SECONDS = 60.0
 STOP_SECONDS = 20.0
-MATCHING_SECONDS = 90.0
+MATCHING_SECONDS = 180.0
 PATIENCE = 20_000.0
 """milliseconds; a loaded machine draws slowly"""
 DRAWN = "() => window.__viserMutable?.camera && '/second' in (window.__viserMutable.nodeRefFromName ?? {})"

@@ -67,30 +67,36 @@ def test_queue(desk: Any, server: Any, project: str) -> None:
 
 def test_threshold(desk: Any, server: Any, project: str) -> None:
     """The slider says what would flip before it is let go; bulk decisions say how many, and are one step back."""
-    slider = desk.page.locator("#threshold")
     before = server.get(f"/api{project}")["threshold"]
-    slider.evaluate("s => { s.value = 6; s.dispatchEvent(new Event('input', { bubbles: true })); }")
+    slide(desk, "1")
     desk.page.get_by_text("would no longer pass").wait_for()
-    flips = server.get(f"/api{project}/threshold?value=6")["would_fail"]
+    flips = server.get(f"/api{project}/threshold?value=1")["would_fail"]
     assert f"{len(flips)} would no longer pass" in desk.page.locator("#threshold-preview").inner_text()
-    assert desk.row(flips[0]).locator(".note").inner_text() == "would fail"
+    assert "would fail" in desk.page.locator("#queue").inner_text()
     assert server.get(f"/api{project}")["threshold"] == before
     desk.picture("threshold")
-    slider.dispatch_event("change")
-    desk.until(lambda: server.get(f"/api{project}")["threshold"] == 6.0, "the threshold")
-    above = sum(row["value"] > 6.0 for row in server.get(f"/api{project}/integrations")["integrations"])
+    slide(desk, "0.5")
+    desk.page.locator("#threshold").dispatch_event("change")
+    desk.until(lambda: server.get(f"/api{project}")["threshold"] == 0.5, "the threshold")
+    above = sum(row["above"] for row in server.get(f"/api{project}/integrations")["integrations"])
     desk.page.get_by_role("button", name=f"Accept {above} above").click()
     desk.until(lambda: desk.count("accepted") == above, "the bulk decision")
     desk.page.locator(".notice").get_by_role("button", name="Undo").click()
     desk.until(lambda: desk.count("accepted") == 0, "the undo")
-    desk.page.locator("#threshold-exact").fill("4")
+    desk.page.locator("#threshold-exact").fill(str(before))
     desk.page.keyboard.press("Enter")
-    desk.until(lambda: server.get(f"/api{project}")["threshold"] == 4.0, "the threshold typed in")
+    desk.until(lambda: server.get(f"/api{project}")["threshold"] == before, "the threshold typed in")
+
+
+def slide(desk: Any, value: str) -> None:
+    """Move the slider of the threshold, and hold it there."""
+    move = "(slider, value) => { slider.value = value; slider.dispatchEvent(new Event('input', { bubbles: true })); }"
+    desk.page.locator("#threshold").evaluate(move, value)
 
 
 def test_parameters(desk: Any, server: Any, project: str) -> None:
-    """The form has every parameter with unit and help; a wrong value is refused with the reason; matches follow."""
-    desk.page.get_by_role("button", name="Parameters").click()
+    """The form has every parameter with unit and help; a wrong value is refused with the reason."""
+    desk.page.get_by_role("button", name="Parameters", exact=True).click()
     described = server.get("/api/parameters")["parameters"]
     desk.until(lambda: desk.page.locator("#parameters-list li").count() == len(described), "the form")
     assert desk.page.get_by_label("Split tolerance").input_value() == "0.03"
@@ -99,7 +105,7 @@ def test_parameters(desk: Any, server: Any, project: str) -> None:
     desk.page.get_by_label("Seed").fill("7")
     desk.page.get_by_role("button", name="Apply 2 changes").click()
     desk.until(lambda: server.get(f"/api{project}")["parameters"]["seed"] == 7, "the parameters")
-    assert desk.page.get_by_role("button", name="Apply", exact=True).is_disabled()
+    desk.until(lambda: desk.page.get_by_role("button", name="Apply", exact=True).is_disabled(), "nothing to apply")
     desk.page.locator("#parameters-form").evaluate("form => { form.noValidate = true; }")
     desk.page.get_by_label("Split tolerance").fill("-1")
     desk.page.get_by_role("button", name="Apply 1 change").click()
@@ -108,6 +114,27 @@ def test_parameters(desk: Any, server: Any, project: str) -> None:
     desk.errors.clear()
     desk.page.keyboard.press("Escape")
     desk.page.locator("#parameters").wait_for(state="hidden")
+
+
+def test_mode(desk: Any, server: Any, project: str) -> None:
+    """In the paper's mode everything is about the value in metres, with the paper's heuristics."""
+    choose_mode(desk, "paper")
+    desk.until(lambda: desk.page.locator("#threshold-title").inner_text() == "Threshold of value", "the value")
+    server.wait_until_matched(project)
+    desk.until(lambda: desk.page.locator("#queue .item .value").first.inner_text().endswith(" m"), "values in metres")
+    desk.picture("paper-mode")
+    choose_mode(desk, "verified")
+    desk.until(lambda: "confidence" in desk.page.locator("#threshold-title").inner_text(), "the confidence")
+    server.wait_until_matched(project)
+
+
+def choose_mode(desk: Any, mode: str) -> None:
+    """Choose a mode in the drawer of the parameters."""
+    desk.page.get_by_role("button", name="Parameters", exact=True).click()
+    desk.page.get_by_label("Mode").select_option(mode)
+    desk.page.get_by_role("button", name="Apply 1 change").click()
+    desk.until(lambda: desk.page.get_by_role("button", name="Apply", exact=True).is_disabled(), "the mode")
+    desk.page.keyboard.press("Escape")
 
 
 def test_help(desk: Any) -> None:
