@@ -14,6 +14,7 @@ from typing import Any, Protocol
 from pydantic import TypeAdapter
 
 from app.jobs import Backlog, Check
+from app.resources import program_version
 from app.review import THRESHOLDS, Outcome
 from segmap.errors import CancelledError, SegmapError
 from segmap.integration import DEFAULT_PRESET, Match, heuristics
@@ -72,7 +73,7 @@ class Settings:
         unused = set() if self.mode == "verified" else EVIDENCE
         relevant = self.parameters.model_dump(mode="json", exclude=IRRELEVANT | foreign | unused)
         calibration = CALIBRATION if self.mode == "verified" else {}
-        told = json.dumps([self.mode, heuristic, relevant, calibration], sort_keys=True)
+        told = json.dumps([program_version(), self.mode, heuristic, relevant, calibration], sort_keys=True)
         return hashlib.sha256(told.encode()).hexdigest()[:24]
 
     @property

@@ -66,21 +66,32 @@ def _judged(snapshot: Snapshot) -> str:
         )
     if snapshot["candidate"] is None or held is None:
         return f'<span style="{FAINT}">No {criterion["quantity"]} yet. Threshold {_amount(threshold, criterion)}</span>'
-    colour = _colour(snapshot, "good" if snapshot["above"] else "bad")
-    side = ("at or above" if criterion["inclusive"] else "above") if snapshot["above"] else _why_not(snapshot, held)
-    words = (
+    words, colour = _side(snapshot, held)
+    told = (
         f'<div style="{NUMBERS}"><span style="font-size:1.5em;font-weight:650">{_amount(held, criterion)}</span> '
-        f'<span style="color:{colour};font-weight:600">{side} the threshold</span> '
+        f'<span style="color:{colour};font-weight:600">{words} the threshold</span> '
         f'<span style="{FAINT}">of {_amount(threshold, criterion)}</span></div>'
     )
-    return words + _bar(held, threshold, colour, criterion["maximum"])
+    return told + _bar(held, threshold, colour, criterion["maximum"]) + _doubts(snapshot, colour)
 
 
-def _why_not(snapshot: Snapshot, held: float) -> str:
-    criterion = snapshot["criterion"]
-    if criterion["inclusive"]:
-        return "below" if held < snapshot["threshold"] else "not valid by its value, though not below"
-    return "not above"
+def _side(snapshot: Snapshot, held: float) -> tuple[str, str]:
+    """On which side of the threshold the candidate is, in words and in a colour."""
+    enough, short = ("at or above", "below") if snapshot["criterion"]["inclusive"] else ("above", "not above")
+    if snapshot["above"]:
+        return enough, _colour(snapshot, "good")
+    if snapshot["verdict"] == "review":
+        doubtful = hexadecimal(PALETTES[snapshot["theme"]].sights[CLASSES.index("shadowed")])
+        return (f"in doubt, though {enough}" if held >= snapshot["threshold"] else short), doubtful
+    return short, _colour(snapshot, "bad")
+
+
+def _doubts(snapshot: Snapshot, colour: str) -> str:
+    """Why the program leaves the pair to a person."""
+    if snapshot["verdict"] != "review" or snapshot["candidate"] != 0:
+        return ""
+    reasons = "".join(f"<div>{_text(reason)}</div>" for reason in snapshot["reasons"])
+    return f'<div style="border-left:3px solid {colour};padding:0 8px;margin:4px 0">{reasons}</div>'
 
 
 def _amount(number: float, criterion: Snapshot) -> str:

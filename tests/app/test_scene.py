@@ -320,6 +320,9 @@ def test_confidence_and_evidence_are_told_in_words(view: View, session: Session)
     ):
         assert words in told
     assert "0.95 confidence at or above" in read(markup.value({**snapshot, "confidence": 0.95, "above": True})).text
+    doubtful = {**snapshot, "confidence": 0.95, "above": False, "verdict": "review", "reasons": ["A rival is close."]}
+    assert "in doubt, though at or above" in read(markup.value(doubtful)).text
+    assert "A rival is close." in read(markup.value(doubtful)).text
     assert "0.85 confidence below" in read(markup.value({**snapshot, "confidence": 0.85, "above": False})).text
     assert "Confidence" in read(markup.heuristics(snapshot)).text
     view.next_candidate()
