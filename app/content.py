@@ -20,10 +20,15 @@ from segmap.pose import FloatArray, Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 
-__all__ = ["Content", "Pair", "Placed", "place"]
+__all__ = ["Content", "Pair", "Placed", "merit", "place"]
 
 GAP = 1.0
 """metres between things that have no relation to each other"""
+
+
+def merit(candidate: Candidate) -> float:
+    """What candidates of one match are ranked by, metres: the score, or in paper mode the value."""
+    return candidate.value if candidate.score is None else candidate.score
 
 
 @dataclass(frozen=True, eq=False)

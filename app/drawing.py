@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from app import grid, map_layers, pair_layers
-from app.content import Content, Pair
+from app.content import Content, Pair, merit
 from app.drawables import Box, Drawable, Frame, label, lines
 from app.palette import RGB
 from app.sights import CLASSES
@@ -126,7 +126,7 @@ def _ghosts(pair: Pair) -> str:
     found = pair_layers.rivals(pair.ranked, pair.candidate)
     if not found:
         return "no other candidate says something else"
-    return "the next best: " + ", ".join(f"#{rank + 1} with {rival.value:.2f} m" for rank, rival in found)
+    return "the next best: " + ", ".join(f"#{rank + 1} with {merit(rival):.2f} m" for rank, rival in found)
 
 
 def _sight_caption(pair: Pair) -> str:
@@ -154,9 +154,16 @@ def _fused_caption(pair: Pair) -> str:
 def _candidate_caption(pair: Pair) -> str:
     if not pair.ranked:
         return "none"
-    low, high = pair.ranked[-1].value, pair.ranked[0].value
+    low, high = merit(pair.ranked[-1]), merit(pair.ranked[0])
     told = f"{_count(len(pair.ranked), 'pose')} (x, y, θ) of the second sensor"
-    return f"{told}; colour and height by value, {low:.2f} to {high:.2f} m"
+    what = "value" if pair.ranked[0].score is None else "score"
+    return f"{told}; colour and height by {what}, {low:.2f} to {high:.2f} m"
+
+
+def _angle_caption(pair: Pair) -> str:
+    if pair.candidate is not None and len({*pair.candidate.angle_1}) == 1:
+        return "the two segments this candidate lays on each other, extreme on extreme"
+    return "the two angles this candidate superimposes, vertex on vertex"
 
 
 def _map_caption(content: Content) -> str:
@@ -221,7 +228,7 @@ _KINDS = {
         "Equal angles",
         "rad",
         pair_layers.angle,
-        lambda _: "the two angles this candidate superimposes, vertex on vertex",
+        _of_pair(_angle_caption),
         _colours("accent"),
     ),
     "rivals": _Kind("Rivals", "m", pair_layers.rival_segments, _of_pair(_ghosts), _colours("neutral")),

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from app.content import Content, Placed
+from app.content import Content, Placed, merit
 from app.drawables import Array32, Drawable, label, lift, lines, points
 from app.palette import RGB
 from segmap.integration import Candidate
@@ -95,16 +95,16 @@ def _home(content: Content, scan: ScanId) -> Placed | None:
 
 
 def candidate_points(content: Content) -> Iterator[Drawable]:
-    """Ranked candidates at (x, y, theta), each with a bar as high as its value; in the plane only (x, y)."""
+    """Ranked candidates at (x, y, theta), each with a bar as high as its value or score; in the plane only (x, y)."""
     pair = content.pair
     if pair is None or not pair.ranked:
         return
     palette, places = content.palette, _places(content, pair.ranked)
-    values = np.array([c.value for c in pair.ranked])
+    values = np.array([merit(c) for c in pair.ranked])
     colours = palette.by_value((values - values.min()) / (np.ptp(values) or 1.0))
     yield Drawable("candidates/points", "candidates", "points", places, palette.neutral, "first", 13, 8.0, colours)
     if content.dimension == 3:
-        yield from _bars(content, places, values / values.max())
+        yield from _bars(content, places, values.clip(0.0) / (values.max() if values.max() > 0.0 else 1.0))
         yield from _turn_axis(content)
     if pair.candidate is not None:
         yield from _shown(content, _places(content, (pair.candidate,))[0])

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from app.content import Content, Pair
+from app.content import Content, Pair, merit
 from app.drawables import Drawable, Frame, dashes, label, lines, points, star
 from segmap.candidates import angles
 from segmap.integration import Candidate
@@ -91,7 +91,7 @@ def lines_of_sight(content: Content) -> Iterator[Drawable]:
     for frame, held, found in zip(FRAMES, seen.points, seen.classes, strict=True):
         if len(held):
             neutral, colours = content.palette.neutral, palette[found]
-            yield Drawable("sights", "sights", "points", points(held), neutral, frame, 6, 5.0, colours)
+            yield Drawable("sights", "sights", "points", points(held), neutral, frame, 10, 4.0, colours)
 
 
 def sensors(content: Content) -> Iterator[Drawable]:
@@ -162,7 +162,7 @@ def rival_segments(content: Content) -> Iterator[Drawable]:
     faint = content.palette.faint(colour, 0.45)
     yield Drawable("rivals/segments", "rivals", "lines", lines(ghosts), faint, depth=1, thickness=1.0)
     for place, (rank, rival) in enumerate(found, 1):
-        text, at = f"#{rank + 1}: {rival.value:.2f} m", rival.T_1_2 @ BESIDE_SENSOR
+        text, at = f"#{rank + 1}: {merit(rival):.2f} m", rival.T_1_2 @ BESIDE_SENSOR
         yield label(f"rivals/label {place}", "rivals", text, at, colour, depth=2)
 
 

@@ -5,13 +5,13 @@ import { count, degrees, fixed, pose, whole } from "./format.js";
 
 const MOST = 500;
 const COLUMNS = [
-  { label: "#", title: "rank by value", of: (c) => c.rank, show: (c) => c.rank + 1 },
+  { label: "#", title: "rank", of: (c) => c.rank, show: (c) => c.rank + 1 },
   { label: "value", title: "value of the transformation, metres", of: (c) => -c.value, show: (c) => fixed(c.value, 2) },
   { label: "score", title: "support of lines of sight less conflict, metres", of: (c) => -c.score, show: (c) => fixed(c.score, 2) },
   { label: "x", title: "metres", of: (c) => c.pose.x, show: (c) => fixed(c.pose.x, 2) },
   { label: "y", title: "metres", of: (c) => c.pose.y, show: (c) => fixed(c.pose.y, 2) },
   { label: "θ°", title: "degrees", of: (c) => c.pose.theta, show: (c) => degrees(c.pose.theta) },
-  { label: "angles", title: "the segments of the first and of the second map whose angles meet", of: (c) => c.angle_1[0], show: angles },
+  { label: "angles", title: "the segments of the first and of the second map that are laid on each other", of: (c) => c.angle_1[0], show: angles },
 ];
 
 export class Candidates {
@@ -94,7 +94,8 @@ export class Candidates {
 }
 
 function angles({ angle_1: first, angle_2: second }) {
-  return `${first.join("·")} → ${second.join("·")}`;
+  const told = (segments) => [...new Set(segments)].join("·");
+  return `${told(first)} → ${told(second)}`;
 }
 
 /** Scroll the panel, and only the panel, until the row is in sight below the sticky head. */

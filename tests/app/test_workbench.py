@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app.actions import ACTIONS
-from app.drawing import LAYERS, STAGES
+from app.drawing import LAYERS, STAGES, draw
 from app.errors import RequestError, UnknownError
+from app.scene import markup
 from app.session import Session
 from app.workbench import DOUBLE_CLICK_SECONDS, View
 from segmap.candidates import PAPER_HEURISTICS as HEURISTICS
@@ -156,6 +159,28 @@ def test_lines_of_sight_are_drawn_at_the_candidate(view: View, session: Session)
     session.configure({}, mode="paper")
     assert session.settle(PATIENCE)
     assert any(drawable.layer == "sights" for drawable in view.picture().drawables)
+
+
+def test_in_verified_mode_candidates_are_told_by_their_score(view: View, session: Session) -> None:
+    """Rivals, and the space of poses, also where scores are negative; what lies on what is told for one segment too."""
+    session.configure({}, mode="verified")
+    assert session.settle(PATIENCE)
+    view.select("0.0-0.1")
+    view.set_stage("candidate")
+    view.set_dimension(3)
+    content = view.content()
+    assert content.pair is not None
+    ranked = content.pair.ranked
+    told = {layer["name"]: layer["caption"] for layer in view.snapshot()["layers"]}
+    assert f"by score, {ranked[-1].score:.2f} to {ranked[0].score:.2f} m" in told["candidates"]
+    assert any(f"with {rival.score:.2f} m" in told["rivals"] for rival in ranked[1:])
+    worthless = replace(content.pair, ranked=tuple(replace(c, score=-1.0 - c.index) for c in ranked))
+    bars = [d for d in draw(replace(content, pair=worthless)).drawables if d.name == "candidates/bars"]
+    assert all(np.isfinite(bar.points).all() for bar in bars)
+    view.set_heuristic("extremes")
+    assert session.settle(PATIENCE)
+    assert "lays on each other" in next(x["caption"] for x in view.snapshot()["layers"] if x["name"] == "angle")
+    assert "laid on segment" in markup.candidate(view.snapshot())
 
 
 def test_a_heuristic_the_mode_does_not_have_is_left(view: View, session: Session) -> None:
