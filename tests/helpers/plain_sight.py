@@ -1,0 +1,146 @@
+"""A plain reading of what beams say, point by point and straight from the definitions.
+
+The twin of the compiled kernels of lines of sight and of refinement: the beams around a point are found by
+sorting headings, distances by looking at every piece, derivatives by differences.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from segmap._sight_kernels import CONTRADICTED, SHADOWED, SUPPORTED, UNSEEN
+from segmap.pose import Pose2
+
+GAP = 0.5
+"""metres; neighbouring returns closer than this are one surface"""
+
+
+def turned(angle):
+    return angle % (2.0 * math.pi)
+
+
+def around(scan, heading, each):
+    """The beams next to a heading, ``each`` on either side, from right to left; None where there is no beam."""
+    turns = turned(scan.angles - heading)
+    order = np.argsort(turns, kind="stable")
+    left, right = order[:each].tolist(), order[::-1][:each].tolist()
+    if not scan.all_round:
+        limits = abs(scan.angle_step) * np.arange(1, each + 1)
+        left = [k if turns[k] < limit else None for k, limit in zip(left, limits, strict=False)]
+        right = [k if 2.0 * math.pi - turns[k] <= limit else None for k, limit in zip(right, limits, strict=False)]
+    fill = [None] * each
+    return [*(right + fill)[:each][::-1], *(left + fill)[:each]]
+
+
+def returned(scan, beam):
+    """Where a beam's return is, in the sensor's frame; None without one."""
+    if beam is None or math.isnan(scan.ranges[beam]):
+        return None
+    angle = scan.first_angle + beam * scan.angle_step
+    return scan.ranges[beam] * np.array([math.cos(angle), math.sin(angle)])
+
+
+def to_piece(point, a, b):
+    """Distance from the line segment a b, and the share along it of the foot, not limited to the segment."""
+    share = (point - a) @ (b - a) / ((b - a) @ (b - a))
+    return math.dist(point, a + min(1.0, max(0.0, share)) * (b - a)), share
+
+
+def to_surface(point, corners):
+    """Distance from the polyline of returns (None: none), joined where closer than the gap."""
+    known = [corner for corner in corners if corner is not None]
+    distances = [math.dist(point, corner) for corner in known]
+    for a, b in pairwise(corners):
+        if a is not None and b is not None and 0.0 < math.dist(a, b) < GAP:
+            distances.append(to_piece(point, a, b)[0])
+    return min(distances, default=math.inf)
+
+
+def seen(sight, point, parameters):
+    """How one sensor sees a point of the map, and how far the point is from where that changes, metres."""
+    local = sight.T_map_sensor.inverse() @ np.asarray(point)
+    heading, far = math.atan2(local[1], local[0]), math.hypot(*local)
+    beams = around(sight.scan, heading, 2)
+    clear = [far * min(turned(heading - angle), turned(angle - heading)) for angle in sight.scan.angles]
+    if beams[1] is None and beams[2] is None:
+        return UNSEEN, min(clear)
+    corners = [returned(sight.scan, beam) for beam in beams]
+    distance = to_surface(local, corners)
+    clear.append(abs(distance - parameters.sight_tolerance))
+    if distance <= parameters.sight_tolerance:
+        return SUPPORTED, min(clear)
+    if corners[1] is None or corners[2] is None:
+        return UNSEEN, min(clear)
+    ranges = [math.hypot(*corner) for corner in corners[1:3]]
+    borders = (*ranges, max(ranges) + parameters.shadow_depth)
+    clear += [abs(far - border) for border in borders]
+    if far < min(ranges):
+        return CONTRADICTED, min(clear)
+    if max(ranges) < far < max(ranges) + parameters.shadow_depth:
+        return SHADOWED, min(clear)
+    return UNSEEN, min(clear)
+
+
+def classes(sights, points, parameters):
+    """The class of each point by all sensors together, and how clear it is: the least of the sensors."""
+    found = [[seen(sight, point, parameters) for sight in sights] for point in points]
+    return np.array([min(c for c, _ in row) for row in found]), np.array([min(m for _, m in row) for row in found])
+
+
+# --- refinement -----------------------------------------------------------------------------------
+
+
+def surface_line(scan, point, gate, reach=3):
+    """The line of the surface nearest to a point, as (normal, offset, distance); and whether two are as near."""
+    beams = around(scan, math.atan2(point[1], point[0]), reach + 1)
+    corners = [returned(scan, beam) for beam in beams]
+    found = []
+    for k, (a, b) in enumerate(pairwise(corners)):
+        if a is None or b is None or not 0.0 < math.dist(a, b) <= GAP:
+            continue
+        distance, share = to_piece(point, a, b)
+        if -0.5 <= share <= 1.5 and distance < gate:
+            found.append((distance, beams[k], beams[k + 1]))
+    if not found:
+        return None, False
+    found.sort()
+    tie = len(found) > 1 and found[1][0] - found[0][0] < 1e-9
+    distance, right, left = found[0]
+    return (*line_through(scan, right, left), distance), tie
+
+
+def line_through(scan, right, left):
+    """The line through two neighbouring returns, over one more on either side where the surface goes on."""
+    a, b = returned(scan, right), returned(scan, left)
+    angle = scan.angles
+    before, after = around(scan, angle[right] - 1e-9, 1)[0], around(scan, angle[left] + 1e-9, 1)[1]
+    before, after = returned(scan, before), returned(scan, after)
+    first = before if before is not None and math.dist(before, a) < GAP else a
+    last = after if after is not None and math.dist(after, b) < GAP else b
+    x, y = (last - first) / math.dist(first, last)
+    return np.array([-y, x]), np.array([-y, x]) @ (first + last) / 2.0
+
+
+def normal_equations(scan_1, scan_2, points_1, points_2, pose, gate):
+    """J^T W J and -J^T W r at a pose (x, y, theta) ``T_1_2`` of two scans at their origins."""
+    rows, weights, residuals = [], [], []
+
+    def moved_2(p, points=points_2):
+        return Pose2(*p) @ points
+
+    def moved_1(p, points=points_1):
+        return Pose2(*p).inverse() @ points
+
+    for scan, moved in ((scan_1, moved_2), (scan_2, moved_1)):
+        places = moved(pose)
+        slopes = np.stack([(moved(pose + h) - moved(pose - h)) / 2e-6 for h in 1e-6 * np.eye(3)], axis=-1)
+        for place, slope in zip(places, slopes, strict=True):
+            line, _ = surface_line(scan, place, gate)
+            if line is not None:
+                normal, offset, distance = line
+                rows.append(normal @ slope)
+                weights.append((1.0 - (distance / gate) ** 2) ** 2)
+                residuals.append(normal @ place - offset)
+    jacobian, weighted = np.array(rows), np.array(rows) * np.array(weights)[:, None]
+    return weighted.T @ jacobian, -weighted.T @ np.array(residuals)
