@@ -29,7 +29,7 @@ class Polyline:
     insertions: int
     """n of the last P_n (Algorithm 5, line 8)"""
     finished: bool
-    """False where the plain variant met its bound and the greedy polyline was taken instead"""
+    """False where the plain variant met its bound: the greedy polyline with spurs was taken instead"""
 
     @property
     def edges(self) -> FloatArray:
@@ -82,15 +82,30 @@ def polyline(members: SegmentMap, parameters: Parameters) -> Polyline:
     """P_0, P_1, ... until every segment of a chain is within ``fusion_tolerance`` of its closest edge.
 
     ``greedy`` inserts each segment at most once; ``plain`` may insert one again, at most ``fusion_bound``
-    times the number of segments in all. Where it meets that bound, the greedy polyline is taken instead and
-    reported as unfinished: what goes round in circles only grows.
+    times the number of segments in all. Where it meets that bound it goes round in circles; then the greedy
+    polyline is taken, with a spur to each segment that is still too far, and reported as unfinished.
     """
-    if parameters.fusion_variant == "plain":
-        line = _grown(members, parameters, again=True)
-        if line.finished:
-            return line
+    if parameters.fusion_variant == "greedy":
+        return _grown(members, parameters, again=False)
+    line = _grown(members, parameters, again=True)
+    if line.finished:
+        return line
     line = _grown(members, parameters, again=False)
-    return replace(line, finished=parameters.fusion_variant == "greedy")
+    far = closest_edges(members.coordinates, line.vertices)[0] > parameters.fusion_tolerance
+    vertices = _with_spurs(line.vertices, members.coordinates[far])
+    return replace(line, vertices=vertices, finished=False)
+
+
+def _with_spurs(vertices: FloatArray, segments: FloatArray) -> FloatArray:
+    """The polyline with a detour from the nearest vertex to each of some segments and back; no edge is lost."""
+    for segment in segments:
+        extremes = segment.reshape(2, 2)
+        apart = np.hypot(*(vertices[:, None] - extremes).transpose(2, 0, 1))
+        vertex, first = divmod(int(np.argmin(apart)), 2)
+        detour = np.stack((extremes[first], extremes[1 - first], vertices[vertex]))
+        detour = detour[1:] if apart[vertex, first] <= LEAST_LENGTH else detour
+        vertices = np.concatenate((vertices[: vertex + 1], detour, vertices[vertex + 1 :]))
+    return vertices
 
 
 def _grown(members: SegmentMap, parameters: Parameters, again: bool) -> Polyline:
