@@ -504,7 +504,7 @@ def test_a_view_is_opened_steered_and_closed(client: Any, project: str) -> None:
 
 
 def test_the_openapi_description_is_complete(client: Any) -> None:
-    """Every route of the contract is described; the description can be made."""
+    """Every route is described; the description can be made."""
     paths = client.get("/api/openapi.json").json()["paths"]
     assert {"/api/projects", "/api/projects/{project}/decisions", "/api/views/{view}"} <= set(paths)
 
