@@ -23,14 +23,16 @@ def turned(angle):
 def around(scan, heading, each):
     """The beams next to a heading, ``each`` on either side, from right to left; None where there is no beam."""
     turns = turned(scan.angles - heading)
-    order = np.argsort(turns, kind="stable")
-    left, right = order[:each].tolist(), order[::-1][:each].tolist()
-    if not scan.all_round:
-        limits = abs(scan.angle_step) * np.arange(1, each + 1)
-        left = [k if turns[k] < limit else None for k, limit in zip(left, limits, strict=False)]
-        right = [k if 2.0 * math.pi - turns[k] <= limit else None for k, limit in zip(right, limits, strict=False)]
-    fill = [None] * each
-    return [*(right + fill)[:each][::-1], *(left + fill)[:each]]
+    order = np.argsort(turns, kind="stable").tolist()
+    if scan.all_round:
+        left, right = order[:each], order[::-1][:each]
+        return [*[None] * (each - len(right)), *right[::-1], *left, *[None] * (each - len(left))]
+    slots = [None] * (2 * each)
+    for k in order:
+        steps = (turns[k] if turns[k] < math.pi else turns[k] - 2.0 * math.pi) / abs(scan.angle_step)
+        if -each <= steps < each:
+            slots[each + math.floor(steps)] = k
+    return slots
 
 
 def returned(scan, beam):
