@@ -162,7 +162,7 @@ def rival_segments(content: Content) -> Iterator[Drawable]:
     faint = content.palette.faint(colour, 0.45)
     yield Drawable("rivals/segments", "rivals", "lines", lines(ghosts), faint, depth=1, thickness=1.0)
     for place, (rank, rival) in enumerate(found, 1):
-        text, at = f"#{rank + 1}: {merit(rival):.2f} m", rival.T_1_2 @ BESIDE_SENSOR
+        text, at = f"#{rank + 1}: {merit(rival):.2f} m".replace("-", "−"), rival.T_1_2 @ BESIDE_SENSOR
         yield label(f"rivals/label {place}", "rivals", text, at, colour, depth=2)
 
 

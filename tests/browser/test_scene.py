@@ -266,10 +266,10 @@ def test_heuristics_are_stepped_through_in_the_scene(window: Window) -> None:
     """The next heuristic is computed, told and drawn."""
     window.focus()
     window.page.keyboard.press("h")
-    window.until(lambda: window.snapshot["heuristic"] == "consecutive", "the next heuristic")
+    window.until(lambda: window.snapshot["heuristic"] == "all", "the next heuristic")
     window.until(lambda: window.snapshot["heuristics"][1]["tried"] is not None, "its result")
     window.page.keyboard.press("Shift+H")
-    window.until(lambda: window.snapshot["heuristic"] == "all", "the heuristic before")
+    window.until(lambda: window.snapshot["heuristic"] == "automatic", "the heuristic before")
 
 
 def test_a_layer_is_switched_by_its_checkbox(window: Window) -> None:
