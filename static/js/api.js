@@ -44,8 +44,14 @@ async function reach(url, options) {
 }
 
 async function failure(response) {
-  const body = await response.json().catch(() => null);
+  const body = await response.json().catch(nothing);
   return described(response.status, body);
+}
+
+/** An answer without a body is none; a request that was taken back is not an answer at all. */
+function nothing(error) {
+  if (error.name === "AbortError") throw error;
+  return null;
 }
 
 function fileName(response) {

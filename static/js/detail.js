@@ -4,6 +4,8 @@ import { byId, fill, h, icon, setIcon, text } from "./dom.js";
 import { measured, pair } from "./format.js";
 import { stateIcon, stateLabel } from "./queue.js";
 
+const PATIENCE = 300;
+
 export class Detail {
   #loading = null;
   #shown = "";
@@ -12,8 +14,8 @@ export class Detail {
   constructor(project, view, panels) {
     Object.assign(this, { project, view, panels });
     view.addEventListener("changed", () => this.#follow());
-    project.addEventListener("match", ({ detail }) => detail.integration === view.integration && this.load());
-    project.addEventListener("parameters", () => this.load());
+    project.addEventListener("match", ({ detail }) => this.#shown && detail.integration === view.integration && this.load());
+    project.addEventListener("parameters", () => this.#forget());
     project.addEventListener("rows", () => this.#head());
   }
 
@@ -30,6 +32,12 @@ export class Detail {
     } catch (error) {
       if (error.name !== "AbortError") project.tell("trouble", error);
     }
+  }
+
+  /** Another mode may not know this heuristic: load again once the view has said what it shows now. */
+  #forget() {
+    this.#shown = "";
+    setTimeout(() => this.#shown === "" && this.#follow(), PATIENCE);
   }
 
   #follow() {

@@ -15,7 +15,7 @@ export class ParameterDrawer {
     byId("parameters-open").addEventListener("click", () => this.toggle());
     byId("parameters-close").addEventListener("click", () => this.dialog.close());
     this.dialog.addEventListener("close", () => byId("parameters-open").focus());
-    this.dialog.addEventListener("keydown", (event) => event.key === "Escape" && this.dialog.close());
+    document.addEventListener("keydown", (event) => event.key === "Escape" && this.dialog.open && this.dialog.close());
     this.form.addEventListener("input", () => this.#changed());
     this.form.addEventListener("submit", (event) => (event.preventDefault(), this.#apply()));
     byId("parameters-preset").addEventListener("change", (event) => this.#take(this.#presets[event.target.value]));

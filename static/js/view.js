@@ -8,7 +8,7 @@ const SETTLE = 30;
 export class View extends EventTarget {
   #sending = 0;
   #queue = Promise.resolve();
-  #heard = 0;
+  #heard = null;
   #wanted = null;
 
   constructor(project) {
@@ -48,8 +48,8 @@ export class View extends EventTarget {
 
   /** A snapshot that came by itself: the scene's own panel was used. Of several, and beside an action, the last counts. */
   hear(snapshot) {
-    clearTimeout(this.#heard);
-    this.#heard = setTimeout(() => this.#idle && this.apply(snapshot), SETTLE);
+    if (this.#heard === null) setTimeout(() => this.#settle(), SETTLE);
+    this.#heard = snapshot;
   }
 
   apply(snapshot) {
@@ -74,6 +74,12 @@ export class View extends EventTarget {
 
   get #url() {
     return `/api/views/${encodeURIComponent(this.id)}`;
+  }
+
+  #settle() {
+    const snapshot = this.#heard;
+    this.#heard = null;
+    if (this.#idle) this.apply(snapshot);
   }
 
   get #idle() {

@@ -16,7 +16,7 @@ import httpx
 import pytest
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Frame, Locator, Page
+    from playwright.sync_api import Browser, ConsoleMessage, Frame, Locator, Page
 
 ROOT = Path(__file__).resolve().parents[2]
 SERVE = (
@@ -105,8 +105,12 @@ class Desk:
         self._pictures = pictures
         self.errors: list[str] = []
         page.set_default_timeout(PATIENCE)
-        page.on("console", lambda message: message.type == "error" and self.errors.append(message.text))
+        page.on("console", self._heard)
         page.on("pageerror", lambda error: self.errors.append(str(error)))
+
+    def _heard(self, message: ConsoleMessage) -> None:
+        if message.type == "error":
+            self.errors.append(f"{message.text} ({message.location['url']})")
 
     def open(self, url: str, *, scene: bool = True) -> None:
         """Go to a project's page; back when its queue is there, and its scene."""

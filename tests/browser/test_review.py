@@ -131,7 +131,7 @@ def test_mode(desk: Any, server: Any, project: str) -> None:
 def choose_mode(desk: Any, mode: str) -> None:
     """Choose a mode in the drawer of the parameters."""
     desk.page.get_by_role("button", name="Parameters", exact=True).click()
-    desk.page.get_by_label("Mode").select_option(mode)
+    desk.page.locator("#parameters-mode").select_option(mode)
     desk.page.get_by_role("button", name="Apply 1 change").click()
     desk.until(lambda: desk.page.get_by_role("button", name="Apply", exact=True).is_disabled(), "the mode")
     desk.page.keyboard.press("Escape")
