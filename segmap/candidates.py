@@ -314,14 +314,15 @@ def _extreme_candidates(map_1: SegmentMap, map_2: SegmentMap) -> Iterator[Candid
     Three candidates for each pair of segments, n_1 n_2 pairs; an undirected segment is laid both ways.
     """
     first, second = np.divmod(np.arange(len(map_1) * len(map_2)), max(1, len(map_2)))
-    flips = (0.0,) if map_1.directed.all() and map_2.directed.all() else (0.0, math.pi)
-    for turn in flips:
-        theta = wrap(map_1.headings[first] - map_2.headings[second] + turn)
+    either_way = ~(map_1.directed[first] & map_2.directed[second])
+    for turn, rows in ((0.0, slice(None)), (math.pi, either_way)):
+        i, j = first[rows], second[rows]
+        theta = wrap(map_1.headings[i] - map_2.headings[j] + turn)
         for share in (0.0, 1.0, 0.5):
-            anchor_1 = _along(map_1, first, share)
-            anchor_2 = _along(map_2, second, 1.0 - share if turn else share)
+            anchor_1 = _along(map_1, i, share)
+            anchor_2 = _along(map_2, j, 1.0 - share if turn else share)
             shift = anchor_1 - _turned(anchor_2, theta)
-            pairs = np.repeat(np.stack((first, second))[..., None], 2, axis=-1)
+            pairs = np.repeat(np.stack((i, j))[..., None], 2, axis=-1)
             yield Candidates(np.column_stack((shift, theta)), *pairs)
 
 

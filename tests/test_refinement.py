@@ -129,7 +129,12 @@ def test_refinement_is_the_same_the_other_way_round():
 @pytest.mark.parametrize("gate", [0.5, 0.15])
 @pytest.mark.parametrize("backwards", [False, True])
 @pytest.mark.parametrize(
-    "laser", [{"beams": 60, "step": 3 * DEGREE}, {"beams": 90, "step": 4 * DEGREE, "first": 2.0}, {"beams": 90}]
+    "laser",
+    [
+        {"beams": 60, "step": 3 * DEGREE},
+        {"beams": 90, "step": 4 * DEGREE, "first": 2.0},
+        {"beams": 99, "step": DEGREE / 2},
+    ],
 )
 def test_normal_equations_are_those_of_the_plain_reading(laser, backwards, gate):
     """J^T W J and -J^T W r, with derivatives by differences; points as near to two surfaces are left out."""
