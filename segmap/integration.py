@@ -380,7 +380,7 @@ def _confidence(ranked: tuple[Candidate, ...]) -> float:
 
 
 def _why_none(found: _Found, task: _Task) -> str:
-    for name, segment_map in (("first", task.map_1), ("second", task.map_2)):
+    for name, segment_map in sorted((("first", task.map_1), ("second", task.map_2)), key=lambda named: len(named[1])):
         if len(segment_map) < 2:
             count = "one segment" if len(segment_map) else "no segments"
             return f"The {name} map has {count}; an angle takes two. Try a smaller min_segment_length."
