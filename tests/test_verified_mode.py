@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import real_pairs
 import simulated
 from hypothesis import given, settings
 from simulated import DEGREE, alone, noisy
@@ -121,8 +122,6 @@ def test_a_corridor_of_equal_doors_lists_its_rivals(reach):
 
 def test_a_real_corridor_is_not_accepted_wrongly(benchmarks, datasets):
     """The pairs of the aces log whose pose walls hold least along the corridor are right, or not accepted."""
-    import real_pairs
-
     pairs, log = real_pairs.pair_set(benchmarks, datasets, "aces")
     for pair in [p for p in pairs.pairs if (p.i, p.j) in {(46, 47), (47, 48), (294, 295), (25, 26)}]:
         match = verified(*real_pairs.maps(pair, log, P))
@@ -165,6 +164,18 @@ def test_candidates_are_named_by_their_place_among_all(in_the_room):
             assert found.angles_1[candidate.index].tolist() == [a, b]
             assert found.angles_2[candidate.index].tolist() == [c, d]
             assert Pose2(*found.poses[candidate.index]).distance(candidate.T_1_2)[0] < 1.0
+
+
+def test_automatic_counts_on_through_its_heuristics():
+    """Where two heuristics were needed, the candidates of the second come after those of the first."""
+    rooms = [extract(noisy(world, T, 7), P) for world, T in _rooms()]
+    blocks = [block for stage in STAGES for block in candidates(*rooms, stage, P)]
+    found, match = Candidates.joined(blocks), verified(*rooms)
+    assert match.candidates == len(found)
+    for candidate in match.ranked:
+        assert found.angles_1[candidate.index].tolist() == list(candidate.angle_1)
+        assert found.angles_2[candidate.index].tolist() == list(candidate.angle_2)
+    assert any(candidate.angle_1[0] != candidate.angle_1[1] for candidate in match.ranked)  # some of the second
 
 
 def test_few_judged_candidates_find_the_pose_too(in_the_room):
