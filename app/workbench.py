@@ -7,6 +7,7 @@ events take none of the view's locks, so a session may send them while it holds 
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -51,6 +52,7 @@ class View:
         self._looks = Looks()
         self._listeners = Listeners()
         self.subscribe = self._listeners.add
+        self._serials = itertools.count(1)
         self._seen = session.state.revision
         self._unsubscribe = session.subscribe(self._hear)
         rows = session.rows()
@@ -73,9 +75,13 @@ class View:
         return draw(self.content())
 
     def snapshot(self) -> dict[str, Any]:
-        """What the panel and the page show now, as JSON."""
-        looks = self._looks
-        return snapshot(self.session, self._evidence, looks, self._evidence.content(looks))
+        """What the panel and the page show now, as JSON.
+
+        Snapshots are made in several threads and may arrive in another order. The serial is taken before
+        anything is looked at, so the one with the greatest serial is the newest.
+        """
+        serial, looks = next(self._serials), self._looks
+        return {"serial": serial, **snapshot(self.session, self._evidence, looks, self._evidence.content(looks))}
 
     def close(self) -> None:
         """Stop listening to the session."""

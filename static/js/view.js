@@ -27,6 +27,7 @@ export class View extends EventTarget {
     const { id, scene } = await post(`${this.project.url}/views`);
     this.id = id;
     this.scene = scene;
+    this.snapshot = { ...this.snapshot, serial: 0 };
     this.dispatchEvent(new Event("opened"));
     const known = integration && this.project.row(integration);
     this.apply(known ? await post(this.#url, { action: "select", value: integration }) : await get(this.#url));
@@ -46,13 +47,15 @@ export class View extends EventTarget {
     while (idle && this.#wanted !== null) await this.#sendWanted();
   }
 
-  /** A snapshot that came by itself: the scene's own panel was used. Of several, and beside an action, the last counts. */
+  /** A snapshot that came by itself: the scene's own panel was used. Of several, and beside an action, the newest counts. */
   hear(snapshot) {
     if (this.#heard === null) setTimeout(() => this.#settle(), SETTLE);
-    this.#heard = snapshot;
+    if (!(snapshot.serial < this.#heard?.serial)) this.#heard = snapshot;
   }
 
+  /** Show a snapshot, unless a newer one is shown already: they may arrive in another order than they were made in. */
   apply(snapshot) {
+    if (snapshot.serial < this.snapshot.serial) return;
     this.snapshot = snapshot;
     this.dispatchEvent(new Event("changed"));
   }

@@ -457,6 +457,24 @@ def test_many_hands_on_one_view_leave_it_whole(view: View, session: Session) -> 
     assert here(view) in session.integrations
 
 
+def test_a_snapshot_told_late_is_known_by_its_serial(view: View, session: Session) -> None:
+    """The one with the greatest serial shows what is looked at now, in whichever order they arrive."""
+    ear = Ear(view)
+    first = view.snapshot()
+    threads = [threading.Thread(target=lambda: [view.next() for _ in range(10)])]
+    threads += [threading.Thread(target=lambda: [view.say("now") for _ in range(10)]) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    ear.stop()
+    serials = [event["serial"] for event in ear.events]
+    newest = max(ear.events, key=lambda event: event["serial"])
+    assert len(set(serials)) == len(serials) == 40
+    assert min(serials) > first["serial"]
+    assert newest["integration"] == view.looks.integration
+
+
 def test_a_closed_view_hears_nothing(view: View, session: Session) -> None:
     """After close, decisions elsewhere reach no subscriber of it."""
     ear = Ear(view)

@@ -166,7 +166,9 @@ class Desk:
             if true():
                 return
             self.page.wait_for_timeout(25)
-        pytest.fail(f"still waiting for: {what}; {self.picture('failed')} shows the page")
+        told = self.page.locator("[role=alert], [role=status]").all_inner_texts()
+        queue = f"{self.selected} is selected, the filters say {self.page.locator('#filters').inner_text()!r}"
+        pytest.fail(f"still waiting for: {what}; {queue}; told: {told}; {self.picture('failed')} shows the page")
 
     def picture(self, name: str) -> Path:
         """Keep what the page looks like now."""

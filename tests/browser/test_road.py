@@ -124,6 +124,27 @@ def export(desk: Any) -> None:
     assert len(saved["features"]) > 20
 
 
+OUT_OF_ORDER = """async () => {
+  const { View } = await import("/static/js/view.js");
+  const view = new View({});
+  view.apply({ serial: 8, integration: "new" });
+  view.hear({ serial: 7, integration: "old" });
+  await new Promise((done) => setTimeout(done, 100));
+  const late = view.integration;
+  view.hear({ serial: 10, integration: "newest" });
+  view.hear({ serial: 9, integration: "newer" });
+  await new Promise((done) => setTimeout(done, 100));
+  return [late, view.integration];
+}"""
+
+
+def test_what_arrives_late_does_not_turn_the_page_back(new_desk: Callable[..., Any], server: Any) -> None:
+    """Of several snapshots of a view the newest is shown, in whichever order they come."""
+    desk = new_desk(800, 600)
+    desk.page.goto(server.url)
+    assert desk.page.evaluate(OUT_OF_ORDER) == ["new", "newest"]
+
+
 def states(server: Any, project: str) -> dict[str, str]:
     """The decisions by integration."""
     rows = server.get(f"/api{project}/integrations")["integrations"]
