@@ -12,7 +12,7 @@ from segmap.parameters import Parameters
 from segmap.pose import IntArray, Pose2
 from segmap.segments import SegmentMap
 
-__all__ = ["MatchingChain", "matching_chains"]
+__all__ = ["MatchingChain", "components", "matching_chains"]
 
 
 @dataclass(frozen=True)
@@ -44,12 +44,12 @@ def matching_chains(
     """The matching chains of two maps under ``T_1_2``, by their lowest segment of map 1."""
     pairs, values = matching_values(map_1, map_2, T_1_2, parameters)
     chains: dict[int, list[tuple[int, int, float]]] = {}
-    for label, (i, j), value in zip(_components(pairs, len(map_1), len(map_2)), pairs, values, strict=True):
+    for label, (i, j), value in zip(components(pairs, len(map_1), len(map_2)), pairs, values, strict=True):
         chains.setdefault(int(label), []).append((int(i), int(j), float(value)))
     return tuple(MatchingChain(tuple(chain)) for chain in chains.values())
 
 
-def _components(pairs: IntArray, n_1: int, n_2: int) -> IntArray:
+def components(pairs: IntArray, n_1: int, n_2: int) -> IntArray:
     """The connected component of each pair, in the graph with the segments of both maps as nodes."""
     nodes = n_1 + n_2
     links = coo_array(([True] * len(pairs), (pairs[:, 0], n_1 + pairs[:, 1])), shape=(nodes, nodes))

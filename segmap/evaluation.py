@@ -67,14 +67,14 @@ def best(values: FloatArray, count: int) -> IntArray:
 
 
 def matching_values(
-    map_1: SegmentMap, map_2: SegmentMap, T_1_2: Pose2, parameters: Parameters
+    map_1: SegmentMap, map_2: SegmentMap, T_1_2: Pose2, parameters: Parameters, least: float = LEAST_MATCH
 ) -> tuple[IntArray, FloatArray]:
     """The pairs of segments that match under ``T_1_2``, shape (m, 2), and their matching values, (m,), metres.
 
-    In index order, so that the values sum to the value of the transformation.
+    In index order, so that the values above ``least`` = 0 sum to the value of the transformation.
     """
     pairs, values = _kernels.matching_pairs(
-        map_1.coordinates, map_2.coordinates, np.array(tuple(T_1_2)), *_measure(parameters), LEAST_MATCH
+        map_1.coordinates, map_2.coordinates, np.array(tuple(T_1_2)), *_measure(parameters), least
     )
     return pairs, values
 

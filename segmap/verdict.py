@@ -15,6 +15,7 @@ __all__ = [
     "Findings",
     "Verdict",
     "confidence",
+    "confidence_terms",
     "features",
     "findings",
     "judge",
@@ -77,9 +78,14 @@ pair above 0.74, and 94 % of the right ones were above 0.9."""
 
 def confidence(findings: Findings) -> float:
     """The calibrated probability, in 0..1, that the best candidate is right within 0.25 m and 5 degrees."""
-    logit = CALIBRATION["intercept"]
-    logit += sum(CALIBRATION[name] * feature for name, feature in features(findings).items())
+    logit = sum(confidence_terms(findings).values())
     return 1.0 / (1.0 + math.exp(-max(-60.0, min(60.0, logit))))
+
+
+def confidence_terms(findings: Findings) -> dict[str, float]:
+    """What each feature adds to the logit of the confidence, and the intercept they start from."""
+    weighted = {name: CALIBRATION[name] * feature for name, feature in features(findings).items()}
+    return {"intercept": CALIBRATION["intercept"], **weighted}
 
 
 def features(findings: Findings) -> dict[str, float]:

@@ -19,7 +19,10 @@ from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
 from segmap.segments import SegmentMap, Sight
 
-__all__ = ["Evidence", "Sighting", "classes", "evidence", "look", "score", "sighting", "thinned"]
+__all__ = ["CLASS_NAMES", "Evidence", "Sighting", "classes", "evidence", "look", "score", "sighting", "thinned"]
+
+CLASS_NAMES = ("supported", "contradicted", "shadowed", "unseen")
+"""the classes by number, and the columns of totals"""
 
 WIDEST = 0.5
 """metres; no return weighs more"""

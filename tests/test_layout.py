@@ -30,6 +30,7 @@ ORDER = (
     "verification",
     "verdict",
     "chains",
+    "explanation",
     "fusion",
     "integration",
     "merging",

@@ -8,8 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
+from app.cli.explaining import explanation_json, print_explanation
 from app.cli.options import (
     DEFAULT_MODE,
+    Explain,
     Heuristic,
     Json,
     Log,
@@ -20,6 +22,7 @@ from app.cli.options import (
     read,
 )
 from app.cli.output import pose_json, print_facts, print_json, show_pose
+from segmap.explanation import explain
 from segmap.integration import Candidate, Match, match_maps
 from segmap.segments import extract
 
@@ -34,16 +37,23 @@ def integrate(
     heuristic: Heuristic = None,
     preset: Preset = None,
     settings: Setting = None,
+    explained: Explain = False,
     as_json: Json = False,
 ) -> None:
     """Find the pose of scan J in the frame of scan I, from their segments alone."""
     laser_log, method = read(log), method_of(mode, heuristic, preset, settings)
     map_1, map_2 = (extract(laser_log.scan(index), method.parameters, index=index) for index in (first, second))
     match = match_maps(map_1, map_2, method.parameters, method.heuristic, method.mode)
+    explanation = None
+    if explained and match.T_1_2 is not None:
+        explanation = explain(map_1, map_2, match.T_1_2, method.parameters, sights=method.mode != "paper")
     if as_json:
-        print_json({"log": laser_log.name, "scans": [first, second], **_document(match)})
-    else:
-        print_facts(_facts(match, first, second))
+        more = {"explanation": explanation_json(match, explanation)} if explained else {}
+        print_json({"log": laser_log.name, "scans": [first, second], **_document(match), **more})
+        return
+    print_facts(_facts(match, first, second))
+    if explanation is not None:
+        print_explanation(match, explanation)
 
 
 def _document(match: Match) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from segmap.scans import LaserLog
 
 __all__ = [
     "DEFAULT_MODE",
+    "Explain",
     "Heuristic",
     "Json",
     "Log",
@@ -54,6 +55,9 @@ Log: TypeAlias = Annotated[
     Path, typer.Argument(metavar="LOG", help="A laser log, plain or gzipped.", show_default=False)
 ]
 Json: TypeAlias = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+Explain: TypeAlias = Annotated[
+    bool, typer.Option("--explain", help="Say what every pair of segments and line of sight adds or takes.")
+]
 Mode: TypeAlias = Annotated[
     str, typer.Option(metavar=one_of(MODES), help="As the paper has it, or with evidence beyond the paper.")
 ]

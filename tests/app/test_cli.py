@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -254,6 +255,25 @@ def test_integrate_tells_the_evidence(document: Callable[..., Any]) -> None:
     assert not {"score", "evidence", "rivals"} & set(document("integrate", OFFICE, 20, 21, "--mode", "paper"))
 
 
+def test_integrate_explains_only_when_asked(run: Run, document: Callable[..., Any]) -> None:
+    """--explain: what sums to value, score and confidence, as JSON and as tables; in paper mode the value alone."""
+    told = document("integrate", OFFICE, 20, 21, "--explain")
+    explained = told["explanation"]
+    assert sum(pair["value"] for pair in explained["pairs"]) == pytest.approx(told["value"])
+    assert explained["score"] == pytest.approx(told["score"])
+    assert sum(explained["terms"].values()) == pytest.approx(told["score"])
+    assert 1.0 / (1.0 + math.exp(-sum(explained["confidence"].values()))) == pytest.approx(told["confidence"])
+    assert "explanation" not in document("integrate", OFFICE, 20, 21)
+    paper = document("integrate", OFFICE, 20, 21, "--mode", "paper", "--explain")["explanation"]
+    assert paper["pairs"]
+    assert paper["score"] is paper["sights"] is paper["confidence"] is None
+    status, out, _ = run("integrate", OFFICE, 20, 21, "--explain")
+    assert status == 0
+    for expected in ("pairs of segments", "common 1 m", "worst segments", "logit of the confidence"):
+        assert expected in out
+    assert "worst segments" not in run("integrate", OFFICE, 20, 21)[1]
+
+
 def test_integrate_finds_where_the_robot_went(document: Callable[..., Any]) -> None:
     """In the laboratory nearly every pose is within 0.25 m and 5 degrees of the truth."""
     poses, right = truth_of("laboratory"), 0
@@ -276,7 +296,8 @@ def test_no_transformation_is_a_result(run: Run, document: Callable[..., Any], t
     """Scans without returns: a null pose, and the reason in words."""
     path = tmp_path / "blind.log"
     path.write_text(RECORD.replace("2.50", "81.83") * 2 + RECORD)
-    told = document("integrate", path, 0, 1)
+    told = document("integrate", path, 0, 1, "--explain")
+    assert told["explanation"] is None
     assert (told["pose"], told["value"], told["verdict"], told["chains"]) == (None, 0.0, "rejected", [])
     assert told["reasons"]
     status, out, _ = run("integrate", path, 0, 1)
