@@ -1,45 +1,58 @@
 """Merged maps as files other programs open.
 
-To add a format, write a module with a function ``Content -> bytes`` and name it in ``FORMATS``.
+To add a format, write a module with an :class:`~segmap.export.components.ExportFormat` and name it
+in ``FORMATS``: command line, web API and pages offer what is there.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from segmap.errors import ExportError
-from segmap.export.components import Content, MapComponent
-from segmap.export.files import write_whole
-from segmap.export.geojson import write_geojson
-from segmap.export.svg import thumbnail, write_svg
+from segmap.export.components import Content, ExportFormat, Files, MapComponent
+from segmap.export.dxf import DXF
+from segmap.export.files import packed, write_whole
+from segmap.export.geojson import GEOJSON
+from segmap.export.png import PNG
+from segmap.export.ros import ROS_MAP
+from segmap.export.svg import SVG, thumbnail
+from segmap.export.table import CSV
+from segmap.export.tum import TUM
 
-__all__ = ["FORMATS", "ExportFormat", "MapComponent", "export_map", "thumbnail", "write_map"]
+__all__ = [
+    "FORMATS",
+    "Content",
+    "ExportFormat",
+    "Files",
+    "MapComponent",
+    "by_suffix",
+    "export_files",
+    "export_map",
+    "format_of",
+    "in_one",
+    "thumbnail",
+    "write_files",
+    "write_map",
+]
 
-
-@dataclass(frozen=True, slots=True)
-class ExportFormat:
-    """A kind of file segmap writes."""
-
-    name: str
-    suffix: str
-    """with the dot"""
-    media_type: str
-    title: str
-    """for people"""
-    write: Callable[[Content], bytes]
-
-
-FORMATS: dict[str, ExportFormat] = {
-    format.name: format
-    for format in (
-        ExportFormat("geojson", ".geojson", "application/geo+json", "GeoJSON, local frame in metres", write_geojson),
-        ExportFormat("svg", ".svg", "image/svg+xml", "SVG drawing in metres", write_svg),
-    )
-}
+FORMATS: dict[str, ExportFormat] = {format.name: format for format in (ROS_MAP, DXF, SVG, PNG, GEOJSON, CSV, TUM)}
 """Every format written, by name."""
+
+
+def export_files(content: Content, format: str) -> Files:
+    """A merged map as the files of a format, by name; the same content gives the same bytes.
+
+    A map without segments gives valid files without segments.
+
+    Raises:
+        ExportError: there is no such format, or it cannot hold the map.
+    """
+    kind = format_of(format)
+    written = kind.write(content)
+    return {f"{content.stem}{kind.suffix}": written} if isinstance(written, bytes) else written
 
 
 def export_map(
@@ -52,12 +65,17 @@ def export_map(
 
     ``metadata`` is written as it is: ``title`` names the drawing; ``version``, ``map_hash`` and
     whatever else tells where the map comes from. ``integrations`` are the ids of the accepted
-    ones (``0.12-0.13``). A map without segments gives a valid file without segments.
+    ones (``0.12-0.13``). A format of several files gives a zip archive of them.
 
     Raises:
         ExportError: there is no such format, or it cannot hold the map.
     """
-    return _format(format).write(Content(components, metadata or {}, integrations))
+    return in_one(export_files(Content(components, metadata or {}, integrations), format), format)
+
+
+def in_one(files: Files, format: str) -> bytes:
+    """The files of a format as one: itself, or a zip archive where the format takes several."""
+    return packed(files) if format_of(format).several else next(iter(files.values()))
 
 
 def write_map(
@@ -69,24 +87,48 @@ def write_map(
 ) -> None:
     """Write the components of a merged map to a file, whole or not at all.
 
-    Without ``format`` the file's suffix says which one.
+    Without ``format`` the file's suffix says which one. A format of several files puts the others
+    beside it, with names that begin like its own.
 
     Raises:
-        ExportError: there is no such format, it cannot hold the map, or the file cannot be written.
+        ExportError: there is no such format, it cannot hold the map, or a file cannot be written.
+    """
+    write_files(Content(components, metadata or {}, integrations), path, format)
+
+
+def write_files(content: Content, path: str | os.PathLike[str], format: str | None = None) -> None:
+    """The same for content that is put together already; its ``stem`` is taken from the path.
+
+    Raises:
+        ExportError: as for ``write_map``.
     """
     target = Path(path)
-    content = export_map(components, format or _by_suffix(target), metadata, integrations)
-    write_whole(target, content)
+    kind = format_of(format or by_suffix(target))
+    files = dict(export_files(replace(content, stem=target.stem), kind.name))
+    if target.name not in files:
+        files = {target.name: files.pop(next(iter(files))), **files}
+    for name in reversed(files):  # what the first one points to is there before it
+        write_whole(target.with_name(name), files[name])
 
 
-def _format(name: str) -> ExportFormat:
+def format_of(name: str) -> ExportFormat:
+    """The format of a name.
+
+    Raises:
+        ExportError: there is none.
+    """
     try:
         return FORMATS[name]
     except KeyError:
         raise ExportError(f"There is no export format {name!r}. Formats are: {', '.join(FORMATS)}.") from None
 
 
-def _by_suffix(path: Path) -> str:
+def by_suffix(path: Path) -> str:
+    """The name of the format that a file's suffix means.
+
+    Raises:
+        ExportError: it means none.
+    """
     for format in FORMATS.values():
         if path.suffix.lower() == format.suffix:
             return format.name

@@ -1,17 +1,24 @@
-"""What every writer is given: the components of a merged map, and words about where they come from."""
+"""What writers are given, the components of a merged map and words about its origin; and what a format is."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
+from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap, Source
 
-__all__ = ["Content", "MapComponent", "scans_of"]
+__all__ = ["RESOLUTION", "Content", "ExportFormat", "Files", "MapComponent", "origin_of", "scans_of", "told_of"]
+
+RESOLUTION = 0.05
+"""metres, the side of a cell of a grid map where nobody asks for another"""
+
+Files: TypeAlias = Mapping[str, bytes]
+"""Contents of files by name; the first is the one people open."""
 
 
 class MapComponent(Protocol):
@@ -24,6 +31,10 @@ class MapComponent(Protocol):
     @property
     def scans(self) -> Sequence[ScanId]:
         """The scans it was merged from."""
+
+    @property
+    def poses(self) -> Mapping[ScanId, Pose2]:
+        """The pose of each of its scans in its frame."""
 
     @property
     def map(self) -> SegmentMap:
@@ -39,6 +50,12 @@ class Content:
     """name and value: ``title``, ``version``, ``map_hash``, ... ; written as it is"""
     integrations: Sequence[str] = ()
     """ids of the accepted integrations, such as ``0.12-0.13``"""
+    times: Mapping[ScanId, float | None] = field(default_factory=dict)
+    """when scans were taken, seconds, where that is known"""
+    stem: str = "map"
+    """what the names of the files begin with"""
+    resolution: float = RESOLUTION
+    """metres, the side of a cell, for formats that are made of cells"""
 
     @cached_property
     def _by_first(self) -> Mapping[str, list[tuple[int, str, str]]]:
@@ -56,6 +73,42 @@ class Content:
         return [integration for _, integration, _ in sorted(found)]
 
 
+@dataclass(frozen=True, slots=True)
+class ExportFormat:
+    """A kind of file segmap writes."""
+
+    name: str
+    suffix: str
+    """of the file people open, with the dot"""
+    media_type: str
+    title: str
+    """for people"""
+    use: str
+    """what it is good for, in a few words"""
+    write: Callable[[Content], bytes | Files]
+    """one file, or several whose names begin with the content's ``stem``"""
+    several: bool = False
+    """whether it takes more than one file; they travel as one zip archive"""
+
+
 def scans_of(sources: Sequence[Source]) -> list[ScanId]:
     """The scans behind a segment, in order, each once."""
     return sorted({ScanId(source.log, source.scan) for source in sources})
+
+
+def origin_of(sources: Sequence[Source]) -> str:
+    """The segments of scans behind a segment, as text: ``0.12.3 0.13.7`` is log, scan and segment of each."""
+    return " ".join(f"{source.log}.{source.scan}.{source.segment}" for source in sources)
+
+
+def told_of(metadata: Mapping[str, str]) -> list[str]:
+    """The metadata as printable lines ``name: value``, in the order of the names, for comments.
+
+    >>> told_of({"version": "0.1.0", "title": "two\\nlines"})
+    ['title: two lines', 'version: 0.1.0']
+    """
+    return [_printable(f"{name}: {value}") for name, value in sorted(metadata.items())]
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in " ".join(text.split()))

@@ -1,14 +1,20 @@
-"""Bytes -> a file, whole or not at all."""
+"""Bytes -> a file, whole or not at all; several files -> one archive."""
 
 from __future__ import annotations
 
+import io
 import os
+import zipfile
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
 from segmap.errors import ExportError
 
-__all__ = ["write_whole"]
+__all__ = ["packed", "write_whole"]
+
+FIRST_DAY = (1980, 1, 1, 0, 0, 0)
+"""the earliest time an archive can give a file: the same files make the same archive, whenever"""
 
 
 def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
@@ -27,3 +33,12 @@ def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
             beside.unlink()
         reason = (error.strerror or str(error)).lower()
         raise ExportError(f"{target} cannot be written: {reason}. Choose another place.") from None
+
+
+def packed(files: Mapping[str, bytes]) -> bytes:
+    """Files as a zip archive; the same files give the same bytes."""
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as pack:
+        for name, content in files.items():
+            pack.writestr(zipfile.ZipInfo(name, FIRST_DAY), content, zipfile.ZIP_DEFLATED)
+    return archive.getvalue()

@@ -1,7 +1,8 @@
 """Components as GeoJSON: a FeatureCollection of LineStrings in metres, marked as a local frame.
 
-RFC 7946 knows only WGS84 unless the parties have agreed otherwise (Section 4); the foreign member
-``coordinate_frame`` is that agreement, in words, and keeps readers from placing the map off Africa.
+RFC 7946 knows only WGS84 unless the parties have agreed otherwise (Section 4). The foreign member
+``coordinate_frame`` is that agreement in words; ``crs``, as GeoJSON of 2008 has it, is what GDAL,
+QGIS and others read: a local frame, so that nobody places the map off Africa.
 """
 
 from __future__ import annotations
@@ -10,10 +11,10 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from segmap.export.components import Content, MapComponent, scans_of
+from segmap.export.components import Content, ExportFormat, MapComponent, scans_of
 from segmap.segments import SegmentMap
 
-__all__ = ["write_geojson"]
+__all__ = ["GEOJSON", "write_geojson"]
 
 DIGITS = 6
 """micrometres"""
@@ -26,12 +27,15 @@ FRAME = {
     " coordinates of different components must not be compared",
     "note": "These are not longitudes and latitudes: no WGS84, no map projection.",
 }
+LOCAL_CS = 'LOCAL_CS["segmap local frame, not geographic",UNIT["metre",1]]'
+CRS = {"type": "name", "properties": {"name": LOCAL_CS}}
 
 
 def write_geojson(content: Content) -> bytes:
     """One feature a segment, in the order of components and segments; the same input gives the same bytes."""
     members = {
         "type": "FeatureCollection",
+        "crs": CRS,
         "coordinate_frame": FRAME,
         "metadata": dict(sorted(content.metadata.items())),
         "components": [_summary(component, content) for component in content.components],
@@ -83,3 +87,13 @@ def _properties(component: MapComponent, segment: int, content: Content) -> dict
         "sources": [[source.log, source.scan, source.segment] for source in sources],
         "integrations": content.integrations_of(scans_of(sources)),
     }
+
+
+GEOJSON = ExportFormat(
+    name="geojson",
+    suffix=".geojson",
+    media_type="application/geo+json",
+    title="GeoJSON",
+    use="for maps and scripts; a local frame in metres",
+    write=write_geojson,
+)

@@ -6,9 +6,33 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
+from segmap.export.components import Content, ExportFormat, MapComponent, told_of
 from segmap.pose import Pose2
 
-__all__ = ["trajectory"]
+__all__ = ["TUM", "left_out", "trajectory", "write_tum"]
+
+
+def write_tum(content: Content) -> bytes:
+    """The poses of the largest component; the scans of the others have other frames, and are listed in comments."""
+    largest = _largest(content.components)
+    scans = sorted(largest.poses) if largest else []
+    poses = [largest.poses[scan] for scan in scans] if largest else []
+    times = [content.times.get(scan) for scan in scans]
+    return trajectory(poses, times, [*told_of(content.metadata), *left_out(content.components)])
+
+
+def left_out(components: Sequence[MapComponent]) -> list[str]:
+    """A line for each component whose scans are not in the trajectory, as its frame is another."""
+    largest = _largest(components)
+    return [
+        f"not in this frame: {component.name}, scans {', '.join(map(str, sorted(component.scans)))}"
+        for component in components
+        if component is not largest
+    ]
+
+
+def _largest(components: Sequence[MapComponent]) -> MapComponent | None:
+    return max(components, key=lambda component: len(component.scans), default=None)
 
 
 def trajectory(poses: Sequence[Pose2], times: Sequence[float | None], remarks: Sequence[str] = ()) -> bytes:
@@ -33,3 +57,13 @@ def _row(stamp: float, pose: Pose2) -> str:
     turn = 0.0, 0.0, math.sin(pose.theta / 2.0), math.cos(pose.theta / 2.0)
     place = " ".join(f"{number + 0.0:.6f}" for number in (pose.x, pose.y, 0.0))
     return f"{stamp:.6f} {place} {' '.join(f'{number + 0.0:.9f}' for number in turn)}"
+
+
+TUM = ExportFormat(
+    name="tum",
+    suffix=".tum",
+    media_type="text/plain",
+    title="TUM trajectory",
+    use="the poses of the scans of the largest component",
+    write=write_tum,
+)

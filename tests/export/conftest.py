@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 
+from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import Order, SegmentMap, Source
 
@@ -19,6 +20,7 @@ class Part:
     name: str
     scans: tuple[ScanId, ...]
     map: SegmentMap
+    poses: Mapping[ScanId, Pose2] = field(default_factory=dict)
 
 
 @pytest.fixture(scope="session")
@@ -32,6 +34,7 @@ def part() -> Callable[..., Part]:
             name,
             (ScanId(0, 0), ScanId(0, 1)),
             SegmentMap(np.array(rows), Order.NONE, np.array(directed, bool), sources),
+            {ScanId(0, 0): Pose2.identity(), ScanId(0, 1): Pose2(1.0, 0.5, 0.25)},
         )
 
     return make

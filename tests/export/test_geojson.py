@@ -6,6 +6,7 @@ import json
 import math
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
@@ -52,6 +53,15 @@ def test_local_frame(corner):
     frame = exported(corner)["coordinate_frame"]
     assert (frame["type"], frame["units"], frame["geographic"]) == ("local", "metres", False)
     assert "no WGS84" in frame["note"]
+
+
+def test_gdal_takes_it_for_a_local_frame(corner, tmp_path):
+    """The reader of QGIS and others finds metres in a local frame, and the same lines."""
+    raw = pytest.importorskip("pyogrio.raw", reason="pyogrio is not installed: pip install segmap[test]")
+    (tmp_path / "map.geojson").write_bytes(export_map([corner], "geojson"))
+    meta, _, shapes, _ = raw.read(tmp_path / "map.geojson")
+    assert meta["crs"].startswith('LOCAL_CS["segmap local frame, not geographic",UNIT["metre",1]')
+    assert shapely.get_coordinates(shapely.from_wkb(shapes)).reshape(-1, 4).tolist() == corner.map.coordinates.tolist()
 
 
 def test_properties(corner, part):

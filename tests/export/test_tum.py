@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from segmap.export import Content, export_files
 from segmap.export.tum import trajectory
 from segmap.pose import Pose2
+from segmap.scans import ScanId
 
 POSES = [Pose2(0.0, 0.0, 0.0), Pose2(1.5, -2.0, 3.0), Pose2(-1.0, 0.25, -1.0)]
 
@@ -35,3 +37,12 @@ def test_numbered_without_times(times):
 def test_empty():
     """No poses are a file of remarks."""
     assert trajectory([], [], ["nothing"]).startswith(b"# nothing\n")
+
+
+def test_largest_component(corner, part):
+    """The poses of the largest component with their times; the scans of the others are named in comments."""
+    small = type(corner)("small", (ScanId(1, 4),), corner.map, {ScanId(1, 4): Pose2.identity()})
+    times = {ScanId(0, 0): 5.0, ScanId(0, 1): 6.5}
+    content = export_files(Content([small, corner], {"map_hash": "5f3a"}, times=times), "tum")["map.tum"]
+    assert read_back(content)[:, :3].tolist() == [[5.0, 0.0, 0.0], [6.5, 1.0, 0.5]]
+    assert b"# map_hash: 5f3a\n# not in this frame: small, scans 1.4\n" in content
