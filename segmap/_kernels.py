@@ -377,3 +377,22 @@ def farthest_extremes(points: FloatArray) -> tuple[int, int]:
                 first = i
                 second = j
     return first, second
+
+
+@_compiled
+def nearest_segments(points: FloatArray, coordinates: FloatArray) -> tuple[IntArray, FloatArray]:
+    """The segment (of rows x1, y1, x2, y2) nearest to each point (m, 2), and how far it is, metres."""
+    nearest = np.zeros(len(points), np.int64)
+    distances = np.full(len(points), np.inf)
+    for k in range(len(points)):
+        for i in range(len(coordinates)):
+            ex = coordinates[i, 2] - coordinates[i, 0]
+            ey = coordinates[i, 3] - coordinates[i, 1]
+            dx = points[k, 0] - coordinates[i, 0]
+            dy = points[k, 1] - coordinates[i, 1]
+            share = min(1.0, max(0.0, (dx * ex + dy * ey) / (ex * ex + ey * ey)))
+            apart = math.sqrt((dx - share * ex) ** 2 + (dy - share * ey) ** 2)
+            if apart < distances[k]:
+                nearest[k] = i
+                distances[k] = apart
+    return nearest, distances

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from segmap._kernels import nearest_segments
 from segmap.pose import FloatArray, IntArray
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "nearest_segments",
     "normal_equations",
     "refine",
+    "witnesses",
 ]
 
 SUPPORTED, CONTRADICTED, SHADOWED, UNSEEN = range(4)
@@ -42,12 +44,15 @@ class Sighting(NamedTuple):
     """What some sensors saw of a map, in arrays."""
 
     points: FloatArray
-    """(m, 3): x, y of returns in the map's frame, and the width of the beam there, metres"""
+    """(m, 3): x, y of returns in the map's frame, and the width of the beam there, metres, shared by the returns of
+    as many sensors as saw that place"""
     beams: FloatArray
     """(n, 5): of every beam of every sensor, x, y in the sensor's frame and range (NaN: no return), and the
     least and the largest range of the surface around it, one beam before to two after (inf and -inf: none)"""
     sensors: FloatArray
     """(s, 8): cosine, sine, x, y of the sensor's pose; first angle, angle step; first beam, number of beams"""
+    mean: float
+    """metres: the width of all returns of one scan, as the mean of the scans"""
 
 
 @_inlined
@@ -159,28 +164,50 @@ def classify(
 def look(
     sighting_1: Sighting, sighting_2: Sighting, poses: FloatArray, tolerance: float, gap: float, depth: float
 ) -> FloatArray:
-    """For each ``T_1_2`` of poses (k, 3): metres of beam width in each class, (k, 4), both ways together."""
+    """For each ``T_1_2`` of poses (k, 3): metres of beam width in each class, (k, 4), both ways together.
+
+    Of a map of several scans everything that is judged counts, and no more is unseen than one scan would have.
+    """
     totals = np.zeros((len(poses), CLASSES))
     for k in range(len(poses)):
         cosine = math.cos(poses[k, 2])
         sine = math.sin(poses[k, 2])
         x = poses[k, 0]
         y = poses[k, 1]
-        _add_classes(totals, k, sighting_2.points, cosine, sine, x, y, sighting_1, tolerance, gap, depth)
+        _add_classes(totals[k], sighting_2, cosine, sine, x, y, sighting_1, tolerance, gap, depth)
         back_x = -cosine * x - sine * y
         back_y = sine * x - cosine * y
-        _add_classes(totals, k, sighting_1.points, cosine, -sine, back_x, back_y, sighting_2, tolerance, gap, depth)
+        _add_classes(totals[k], sighting_1, cosine, -sine, back_x, back_y, sighting_2, tolerance, gap, depth)
     return totals
 
 
 @_compiled
-def _add_classes(totals, row, points, cosine, sine, x, y, seen, tolerance, gap, depth):  # type: ignore[no-untyped-def]
-    beams = seen.beams
-    sensors = seen.sensors
+def _add_classes(totals, seen, cosine, sine, x, y, by, tolerance, gap, depth):  # type: ignore[no-untyped-def]
+    """Add the metres of one map's points, moved into the frame of another map's sensors, by class."""
+    points = seen.points
+    before = totals[UNSEEN]
+    judged = 0.0
     for q in range(len(points)):
         px = cosine * points[q, 0] - sine * points[q, 1] + x
         py = sine * points[q, 0] + cosine * points[q, 1] + y
-        totals[row, _class_of(px, py, beams, sensors, tolerance, gap, depth)] += points[q, 2]
+        found = _class_of(px, py, by.beams, by.sensors, tolerance, gap, depth)
+        totals[found] += points[q, 2]
+        judged += points[q, 2] if found != UNSEEN else 0.0
+    if len(seen.sensors) > 1:
+        totals[UNSEEN] = before + max(0.0, seen.mean - judged)
+
+
+@_compiled
+def witnesses(points: FloatArray, beams: FloatArray, sensors: FloatArray, tolerance: float, gap: float) -> FloatArray:
+    """How many of a map's sensors see a surface at each of its points (m, 3), (m,), at least 1."""
+    counts = np.ones(len(points))
+    for k in range(len(points)):
+        seen = 0
+        for s in range(len(sensors)):
+            if _seen_by(points[k, 0], points[k, 1], beams, sensors, s, tolerance, gap, 0.0) == SUPPORTED:
+                seen += 1
+        counts[k] = max(1, seen)
+    return counts
 
 
 @_compiled
@@ -368,22 +395,3 @@ def _step(normal, rhs, pose):  # type: ignore[no-untyped-def]
     pose[0] += shrink * delta[0]
     pose[1] += shrink * delta[1]
     pose[2] += min(_TURN_STEP, max(-_TURN_STEP, delta[2]))
-
-
-@_compiled
-def nearest_segments(points: FloatArray, coordinates: FloatArray) -> tuple[IntArray, FloatArray]:
-    """The segment (of rows x1, y1, x2, y2) nearest to each point (m, 2), and how far it is, metres."""
-    nearest = np.zeros(len(points), np.int64)
-    distances = np.full(len(points), np.inf)
-    for k in range(len(points)):
-        for i in range(len(coordinates)):
-            ex = coordinates[i, 2] - coordinates[i, 0]
-            ey = coordinates[i, 3] - coordinates[i, 1]
-            dx = points[k, 0] - coordinates[i, 0]
-            dy = points[k, 1] - coordinates[i, 1]
-            share = min(1.0, max(0.0, (dx * ex + dy * ey) / (ex * ex + ey * ey)))
-            apart = math.sqrt((dx - share * ex) ** 2 + (dy - share * ey) ** 2)
-            if apart < distances[k]:
-                nearest[k] = i
-                distances[k] = apart
-    return nearest, distances

@@ -4,7 +4,7 @@ A scan is not only segments: each beam says that the space before its return is 
 a return of one map is *supported* where the other map's sensors see a surface at it, *contradicted* where
 they see through it, *shadowed* where it lies close behind a surface they see, and *unseen* otherwise. Each
 return weighs as many metres as its beam is wide there, so that a near wall does not outvote the far end of
-a corridor.
+a corridor. What several scans of a map saw weighs as if one of them had seen it.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ WIDEST = 0.5
 """metres; no return weighs more"""
 SURFACE_GAP = 0.5
 """metres; two neighbouring returns closer than this are taken as one surface"""
+SAME_PLACE = 0.2
+"""metres; returns of several scans of a map this close to a surface that others see are of that surface"""
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,10 @@ def sighting(segment_map: SegmentMap) -> Sighting | None:
     beams = np.concatenate([_beams(sight) for sight in sights])
     starts = np.cumsum([0] + [len(sight.scan) for sight in sights])
     sensors = np.array([_sensor(sight, start) for sight, start in zip(sights, starts, strict=False)])
-    return Sighting(points, beams, sensors)
+    mean = float(points[:, 2].sum()) / len(sensors)
+    if len(sensors) > 1:
+        points[:, 2] /= kernels.witnesses(points, beams, sensors, SAME_PLACE, SURFACE_GAP)
+    return Sighting(points, beams, sensors, mean)
 
 
 def _points(sight: Sight) -> FloatArray:
@@ -99,8 +104,8 @@ def _sensor(sight: Sight, start: int) -> tuple[float, ...]:
 
 
 def thinned(seen: Sighting, most: int) -> Sighting:
-    """The same sensors with at most about ``most`` points, evenly taken; each stands for those left out."""
-    stride = max(1, round(len(seen.points) / most))
+    """The same sensors with at most about ``most`` points each, evenly taken; each stands for those left out."""
+    stride = max(1, round(len(seen.points) / (most * len(seen.sensors))))
     if stride == 1:
         return seen
     points = seen.points[stride // 2 :: stride].copy()

@@ -218,6 +218,34 @@ def test_thinning_keeps_the_weight(most, share):
 # --- several sensors ------------------------------------------------------------------------------
 
 
+def test_the_same_scan_many_times_counts_once():
+    """A map of one scan, twice or ten times over, has as many metres of each class as that scan."""
+    scans = [(Pose2.identity(), exact(simulated.room(), T)) for T in (HERE, THERE)]
+    poses = np.array([tuple(SHIFTED), (0.4, -0.7, 2.0), (90.0, 0.0, 0.0)])
+    once = look(*(sighting(sight_map(scan)) for scan in scans), poses, Parameters())
+    for times in ((2, 1), (1, 10), (3, 5)):
+        often = [sighting(sight_map(*[scan] * n)) for scan, n in zip(scans, times, strict=True)]
+        assert look(*often, poses, Parameters()) == pytest.approx(once)
+
+
+def test_of_a_map_all_that_is_judged_counts_and_little_that_is_not():
+    """The weight of a place is shared by the scans that saw it; unseen is at most what one scan would have."""
+    sights = [(T, exact(simulated.room(), T)) for T in (HERE, THERE, Pose2(4.5, 3.8, 2.8))]
+    lone, whole = sighting(alone(sights[0][1])), sighting(sight_map(*sights))
+    scans = [sighting(sight_map(sight)) for sight in sights]
+    each = np.concatenate([scan.points[:, 2] for scan in scans])
+    seeing = sum(classified(sight_map(sight), whole.points[:, :2]) == SUPPORTED for sight in sights)
+    assert set(seeing) == {1, 2, 3}
+    assert whole.points[:, 2] == pytest.approx(each / seeing)
+    assert whole.mean == pytest.approx(each.sum() / 3)
+    for T in (HERE.inverse(), Pose2(-1.0, 0.3, 0.4), Pose2(90.0, 0.0, 0.0)):
+        of_lone, of_whole = classes(lone, whole, T, Parameters())
+        expected = np.bincount(of_lone, weights=lone.points[:, 2], minlength=CLASSES)
+        metres = np.bincount(of_whole, weights=whole.points[:, 2], minlength=CLASSES)
+        metres[UNSEEN] = max(0.0, whole.mean - metres[:UNSEEN].sum())
+        assert look(lone, whole, np.array([tuple(T)]), Parameters())[0] == pytest.approx(expected + metres)
+
+
 def test_one_sensor_s_support_outweighs_another_s_conflict():
     """What one sensor supports is supported, whatever the others say; then conflict, then shadow."""
     sights = [(T, exact(simulated.room(), T)) for T in (HERE, THERE, Pose2(4.5, 3.8, 2.8))]
