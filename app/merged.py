@@ -10,14 +10,14 @@ from app.resources import program_version
 from app.review import THRESHOLDS
 from segmap.errors import CancelledError, ExportError, ProjectError, SegmapError
 from segmap.events import IntegrationId
-from segmap.export import export_map
+from segmap.export import RESOLUTION, Content
 from segmap.merging import Component, map_hash, merge_accepted
 from segmap.parameters import Parameters
 from segmap.project import ProjectState, accepted
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 
-__all__ = ["Merged", "MergedMap", "export_project", "map_parameters", "merge_project"]
+__all__ = ["Merged", "MergedMap", "exportable", "map_parameters", "merge_project"]
 
 Extractor = Callable[[ScanId, Parameters], SegmentMap]
 
@@ -59,11 +59,20 @@ def merge_project(
     return Merged(state.revision, components, map_hash(components), parameters, integrations)
 
 
-def export_project(state: ProjectState, merged: Merged, format: str) -> bytes:
-    """The merged map of a project as the bytes of a file, which says where it comes from.
+def exportable(
+    state: ProjectState,
+    merged: Merged,
+    time_of: Callable[[ScanId], float | None],
+    stem: str = "map",
+    resolution: float = RESOLUTION,
+) -> Content:
+    """The merged map of a project, ready to be written in any format; it says where it comes from.
+
+    ``stem`` is what the names of files begin with, ``resolution`` the side of a cell in metres where
+    a format has cells.
 
     Raises:
-        ExportError: nothing is accepted, or there is no such format.
+        ExportError: nothing is accepted.
     """
     if not merged.components:
         raise ExportError("There is nothing to export: accept at least one integration first.")
@@ -74,7 +83,8 @@ def export_project(state: ProjectState, merged: Merged, format: str) -> bytes:
         "revision": str(merged.revision),
         "parameters": state.fingerprint,
     }
-    return export_map(merged.components, format, told, merged.integrations)
+    times = {scan: time_of(scan) for component in merged.components for scan in component.scans}
+    return Content(merged.components, told, merged.integrations, times, stem, resolution)
 
 
 class MergedMap:

@@ -161,6 +161,24 @@ class ProjectList(BaseModel):
     projects: list[ProjectSummary]
 
 
+class ExportChoice(BaseModel):
+    """A format a merged map can be saved in."""
+
+    name: str
+    title: str
+    """what people call the format"""
+    holds: str
+    """what is in such a file, for people"""
+    use: str
+    """what it is good for"""
+
+
+class ExportList(BaseModel):
+    """What a merged map can be saved as."""
+
+    formats: list[ExportChoice]
+
+
 class Created(BaseModel):
     """A new project."""
 

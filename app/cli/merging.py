@@ -23,10 +23,10 @@ from app.cli.options import (
     read,
 )
 from app.cli.output import pose_json, print_json, print_table, progress
-from app.cli.writing import checked_suffix, described, listed, new_project, write_trajectory
+from app.cli.writing import described, listed, new_project, times_of, write_trajectory
 from segmap.errors import ProjectError
 from segmap.events import IntegrationId
-from segmap.export import write_map
+from segmap.export import Content, by_suffix, write_files
 from segmap.integration import Match, Verdict
 from segmap.merging import METHODS, Component, Merge, map_hash
 from segmap.merging import merge as merge_maps
@@ -73,8 +73,9 @@ def merge(
     _check_places(out or [], project)
     laser_logs = [read(path) for path in logs]
     merged = _merged(laser_logs, by, method)
+    content = Content(merged.components, merged.about, list(map(str, merged.accepted)), times_of(laser_logs))
     for path in out or []:
-        write_map(merged.components, path, None, merged.about, list(map(str, merged.accepted)))
+        write_files(content, path)
     if trajectory is not None:
         write_trajectory(trajectory, merged.components, laser_logs)
     if project is not None:
@@ -86,7 +87,7 @@ def merge(
 def _check_places(out: Sequence[Path], project: Path | None) -> None:
     """Say before the work what could not be written after it."""
     for path in out:
-        checked_suffix(path)
+        by_suffix(path)
     if project is not None and project.exists():
         raise ProjectError(f"{project} is there already: choose another name, or open it with segmap serve.")
 

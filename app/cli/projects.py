@@ -10,10 +10,8 @@ import typer
 
 from app.cli.options import one_of
 from app.inputs import Inputs
-from app.merged import Merged, export_project, merge_project
-from segmap.export import FORMATS
-from segmap.export.files import write_whole
-from segmap.project import ProjectState
+from app.merged import exportable, merge_project
+from segmap.export import FORMATS, RESOLUTION, format_of, write_files
 from segmap.simulate import write_samples
 from segmap.store import Store
 
@@ -48,22 +46,27 @@ def export(
     project: Project,
     to: Annotated[str, typer.Option(metavar=one_of(FORMATS), help="The format.", show_default=False)],
     out: Annotated[Path, typer.Option(metavar="PATH", help="The file to write.", show_default=False)],
+    resolution: Annotated[
+        float, typer.Option(metavar="METRES", help="The side of a cell, for formats that are made of cells.")
+    ] = RESOLUTION,
 ) -> None:
-    """Write the map of a project: what is accepted in it, and nothing else."""
-    state, merged = _rebuilt(project)
-    write_whole(out, export_project(state, merged, to))
+    """Write the map of a project: what is accepted in it, and nothing else.
+
+    Where a format takes several files, the others are put beside the one that is named.
+    """
+    format_of(to)
+    with Store.open(project) as store:
+        inputs = Inputs(store, store.state.logs, store.log_bytes)
+        merged = merge_project(store.state, inputs.segment_map)
+        content = exportable(store.state, merged, lambda scan: inputs.scan(scan).time, out.stem, resolution)
+    write_files(content, out, to)
 
 
 def replay(project: Project) -> None:
     """Rebuild the map of a project from its logs and decisions, and print the map's hash."""
-    typer.echo(_rebuilt(project)[1].hash)
-
-
-def _rebuilt(project: Path) -> tuple[ProjectState, Merged]:
     with Store.open(project) as store:
-        state = store.state
-        inputs = Inputs(store, state.logs, store.log_bytes)
-        return state, merge_project(state, inputs.segment_map)
+        inputs = Inputs(store, store.state.logs, store.log_bytes)
+        typer.echo(merge_project(store.state, inputs.segment_map).hash)
 
 
 def sample(

@@ -10,28 +10,20 @@ import typer
 from app.cli.options import Method
 from app.inputs import facts_of, remember
 from app.resources import program_version
-from segmap.errors import ExportError, LogError
+from segmap.errors import LogError
 from segmap.events import Choice, Decide, IntegrationId, fingerprint
-from segmap.export import FORMATS
-from segmap.export.files import write_whole
-from segmap.export.tum import trajectory
+from segmap.export import Content, write_files
+from segmap.export.tum import left_out
 from segmap.integration import Match
 from segmap.merging import Component
 from segmap.parameters import Parameters
 from segmap.scans import LaserLog, ScanId
 from segmap.store import Store
 
-__all__ = ["checked_suffix", "described", "listed", "new_project", "write_trajectory"]
+__all__ = ["described", "listed", "new_project", "times_of", "write_trajectory"]
 
 COMMAND = "segmap merge"
 """who decided, in the history of a project"""
-
-
-def checked_suffix(path: Path) -> None:
-    """Raises ExportError where a file's suffix names no format."""
-    suffixes = [format.suffix for format in FORMATS.values()]
-    if path.suffix.lower() not in suffixes:
-        raise ExportError(f"{path} does not say its format: let the name end in one of {', '.join(suffixes)}.")
 
 
 def described(title: str, hash: str) -> dict[str, str]:
@@ -46,18 +38,14 @@ def listed(scans: Iterable[ScanId]) -> str:
 
 def write_trajectory(path: Path, components: Sequence[Component], logs: Sequence[LaserLog]) -> None:
     """The poses of the largest component; the scans of the others have other frames, and are listed."""
-    largest = max(components, key=lambda component: len(component.scans), default=None)
-    remarks = [f"not in this frame: {c.name}, scans {listed(sorted(c.scans))}" for c in components if c is not largest]
-    for remark in remarks:
+    for remark in left_out(components):
         typer.echo(f"segmap: {path.name}: {remark}", err=True)
-    scans = sorted(largest.scans) if largest else []
-    poses = [largest.poses[scan] for scan in scans] if largest else []
-    times = [_time(logs, scan) for scan in scans]
-    write_whole(path, trajectory(poses, times, remarks))
+    write_files(Content(components, times=times_of(logs)), path, "tum")
 
 
-def _time(logs: Sequence[LaserLog], scan: ScanId) -> float | None:
-    return logs[scan.log][scan.scan].time
+def times_of(logs: Sequence[LaserLog]) -> dict[ScanId, float | None]:
+    """When each scan of some logs was taken, seconds."""
+    return {ScanId(number, i): scan.time for number, log in enumerate(logs) for i, scan in enumerate(log)}
 
 
 def new_project(

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 from urllib.parse import quote
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Query
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, Response
 from pydantic import ValidationError
@@ -20,13 +20,15 @@ from starlette.requests import Request
 
 from app.creation import Source
 from app.errors import UnknownError
-from app.merged import export_project
+from app.merged import exportable
 from app.routes.common import Opened, Site
 from app.schemas import (
     Component,
     Counts,
     Created,
     Criterion,
+    ExportChoice,
+    ExportList,
     LogFacts,
     ParameterList,
     ProgressBody,
@@ -39,7 +41,7 @@ from app.schemas import (
 )
 from app.session import Session
 from app.workspace import Summary
-from segmap.export import FORMATS
+from segmap.export import FORMATS, RESOLUTION, export_files, in_one
 from segmap.integration import MODES, heuristics
 from segmap.logs import base_name
 from segmap.merging import Component as MapComponent
@@ -53,6 +55,7 @@ router = APIRouter(prefix="/api", tags=["projects"])
 FILES = 64
 """most files of one upload"""
 MERGING_SECONDS = 120.0
+Resolution = Annotated[float, Query(gt=0.0, le=1000.0, allow_inf_nan=False, description="Metres a cell of a grid map.")]
 SVG_POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'self'; sandbox"
 
 
@@ -225,14 +228,26 @@ def _svg(text: str) -> Response:
     return Response(text, media_type="image/svg+xml", headers={"Content-Security-Policy": SVG_POLICY})
 
 
+@router.get("/exports")
+def exports() -> ExportList:
+    """What a merged map can be saved as."""
+    return ExportList(
+        formats=[
+            ExportChoice(name=kind.name, title=kind.title, holds=kind.holds, use=kind.use) for kind in FORMATS.values()
+        ]
+    )
+
+
 @router.get("/projects/{project}/export/{format}", response_class=Response)
-def export(session: Opened, format: str) -> Response:
-    """The merged map of everything that is accepted, as a file."""
+def export(session: Opened, format: str, resolution: Resolution = RESOLUTION) -> Response:
+    """The merged map of everything that is accepted, as a file; a zip archive where a format takes several."""
     if format not in FORMATS:
         raise UnknownError(f"There is no export format {format[:80]!r}. Formats are: {', '.join(FORMATS)}.")
     state, merged = session.state, session.merged(MERGING_SECONDS)
-    content, kind = export_project(state, merged, format), FORMATS[format]
-    return Response(content, media_type=kind.media_type, headers=_attached(state.name, kind.suffix))
+    content = exportable(state, merged, lambda scan: session.scan(scan).time, _plain(state.name), resolution)
+    kind, file = FORMATS[format], in_one(export_files(content, format), format)
+    suffix, media_type = (".zip", "application/zip") if kind.several else (kind.suffix, kind.media_type)
+    return Response(file, media_type=media_type, headers=_attached(state.name, suffix))
 
 
 @router.get("/projects/{project}/download", response_class=FileResponse)
@@ -254,5 +269,9 @@ def download(site: Site, project: str) -> FileResponse:
 def _attached(name: str, suffix: str) -> dict[str, str]:
     """The header that saves an answer as a file of this name; what a name may not hold is encoded."""
     file = f"{base_name(name)}{suffix}"
-    plain = "".join(c if c.isascii() and (c.isalnum() or c in " ._-") else "_" for c in file)
-    return {"Content-Disposition": f"attachment; filename=\"{plain}\"; filename*=utf-8''{quote(file, safe='')}"}
+    return {"Content-Disposition": f"attachment; filename=\"{_plain(file)}\"; filename*=utf-8''{quote(file, safe='')}"}
+
+
+def _plain(name: str) -> str:
+    """A name that every file system takes."""
+    return "".join(c if c.isascii() and (c.isalnum() or c in " ._-") else "_" for c in base_name(name))

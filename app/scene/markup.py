@@ -13,6 +13,7 @@ from typing import Any
 
 from app.palette import PALETTES, hexadecimal
 from app.sights import CLASSES
+from segmap.export import FORMATS
 
 __all__ = ["candidate", "exports", "heuristics", "legend", "messages", "picked", "step", "value"]
 
@@ -245,7 +246,7 @@ def exports(project: str) -> str:
     place = f"/api/projects/{_text(project)}/export"
     links = " · ".join(
         f'<a href="{place}/{kind}" download style="color:var(--mantine-color-anchor)">{name}</a>'
-        for kind, name in (("geojson", "GeoJSON"), ("svg", "SVG"))
+        for kind, name in ((format.name, format.title) for format in FORMATS.values())
     )
     return _block(f"Merged map as {links}")
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from segmap.errors import ExportError
-from segmap.export.components import Content, ExportFormat, Files, MapComponent
+from segmap.export.components import RESOLUTION, Content, ExportFormat, Files, MapComponent
 from segmap.export.dxf import DXF
 from segmap.export.files import packed, write_whole
 from segmap.export.geojson import GEOJSON
@@ -24,6 +24,7 @@ from segmap.export.tum import TUM
 
 __all__ = [
     "FORMATS",
+    "RESOLUTION",
     "Content",
     "ExportFormat",
     "Files",

@@ -82,11 +82,13 @@ class ExportFormat:
     """of the file people open, with the dot"""
     media_type: str
     title: str
-    """for people"""
+    """what people call the format"""
     use: str
     """what it is good for, in a few words"""
     write: Callable[[Content], bytes | Files]
     """one file, or several whose names begin with the content's ``stem``"""
+    holds: str = "Merged map"
+    """for people"""
     several: bool = False
     """whether it takes more than one file; they travel as one zip archive"""
 

@@ -1,14 +1,15 @@
 """A component as a grid: occupied along its segments, free where its scans looked through, unknown elsewhere.
 
-Free is what lies between two neighbouring beams that both returned, up to the surface they met; a
-beam without a return says nothing. Where a return belongs to no segment something was seen that is
-not in the map: that cell is unknown, however many beams pass it.
+Free is what lies between two neighbouring beams that both returned, up to the surface they met, and
+where a sensor stood; a beam without a return says nothing. Where a return belongs to no segment
+something was seen that is not in the map: that cell is unknown, however many beams pass it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,9 @@ BEYOND = 10.0
 """metres around segments and sensors; what beams saw farther out is left off the grid"""
 CELLS = 1 << 26
 """more do not fit the programs that open it"""
+SENSOR = 0.01
+"""metres; half the side of what a sensor takes up at the least"""
+CORNERS = ((-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0))
 NEAR = 2
 """cells; a return this near to a wall is the wall"""
 
@@ -60,6 +64,8 @@ def grid_of(component_map: SegmentMap, resolution: float) -> Grid:
     x, y, columns, rows = _frame(component_map, triangles, resolution)
     cells = np.full((rows, columns), UNKNOWN, np.uint8)
     _raster.fill_triangles(cells, (triangles - (x, y)) / resolution, FREE)
+    for corner in CORNERS:
+        _set(cells, (_sensors(component_map) + np.array(corner) * SENSOR - (x, y)) / resolution, FREE)
     walls = np.zeros((rows, columns), np.uint8)
     _raster.draw_lines(walls, (component_map.coordinates - (x, y, x, y)) / resolution, 1)
     _forget(cells, walls, (returns - (x, y)) / resolution)
@@ -94,8 +100,7 @@ def _ends(ranges: FloatArray, headings: FloatArray) -> FloatArray:
 
 def _frame(component_map: SegmentMap, triangles: FloatArray, resolution: float) -> tuple[float, float, int, int]:
     """x and y of the lower left corner, metres, and the number of columns and rows."""
-    sensors = [[sight.T_map_sensor.x, sight.T_map_sensor.y] for sight in component_map.sights]
-    known = np.concatenate((component_map.coordinates.reshape(-1, 2), np.reshape(sensors, (-1, 2))))
+    known = np.concatenate((component_map.coordinates.reshape(-1, 2), _sensors(component_map)))
     if not len(known):
         return 0.0, 0.0, 1, 1
     seen = np.clip(triangles.reshape(-1, 2), known.min(axis=0) - BEYOND, known.max(axis=0) + BEYOND)
@@ -111,11 +116,22 @@ def _frame(component_map: SegmentMap, triangles: FloatArray, resolution: float) 
     return float(low[0] * resolution), float(low[1] * resolution), int(columns), int(rows)
 
 
+def _sensors(component_map: SegmentMap) -> FloatArray:
+    """Where the scans were taken, (n, 2), metres."""
+    places = [(sight.T_map_sensor.x, sight.T_map_sensor.y) for sight in component_map.sights]
+    return np.array(places, np.float64).reshape(-1, 2)
+
+
 def _forget(cells: NDArray[np.uint8], walls: NDArray[np.uint8], returns: FloatArray) -> None:
     """Cells with returns far from any wall are unknown; returns in cells, (n, 2)."""
     near = ndimage.binary_dilation(walls, np.ones((3, 3)), NEAR)
-    columns, rows = np.floor(returns).astype(np.int64).T
+    lonely = np.zeros(cells.shape, bool)
+    _set(lonely, returns, True)
+    cells[lonely & ~near] = UNKNOWN
+
+
+def _set(cells: NDArray[Any], points: FloatArray, value: int) -> None:
+    """Set the cells of some points, (n, 2), in cells; those outside are passed over."""
+    columns, rows = np.floor(points).astype(np.int64).T
     inside = (columns >= 0) & (rows >= 0) & (columns < cells.shape[1]) & (rows < cells.shape[0])
-    columns, rows = columns[inside], rows[inside]
-    lonely = ~near[rows, columns]
-    cells[rows[lonely], columns[lonely]] = UNKNOWN
+    cells[rows[inside], columns[inside]] = value

@@ -63,7 +63,8 @@ TUM = ExportFormat(
     name="tum",
     suffix=".tum",
     media_type="text/plain",
-    title="TUM trajectory",
+    title="TUM",
     use="the poses of the scans of the largest component",
+    holds="Trajectory",
     write=write_tum,
 )

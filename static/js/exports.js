@@ -1,18 +1,35 @@
 // The export menu: a list of links that save files, and say why when there is nothing to save.
 
-import { file } from "./api.js";
-import { byId } from "./dom.js";
+import { file, get } from "./api.js";
+import { byId, h } from "./dom.js";
 import { failed, notice } from "./notices.js";
 
-/** Make the menu work for a project. */
-export function exportMenu(project) {
+/** Make the menu work for a project: every format the server writes, and what the page itself lists. */
+export async function exportMenu(project) {
   const menu = byId("export");
-  for (const link of menu.querySelectorAll("a")) {
-    link.href = `${project.url}/${link.dataset.path}`;
-    link.addEventListener("click", (event) => (event.preventDefault(), save(link, menu)));
-  }
+  menu.addEventListener("click", (event) => chosen(event, menu));
   document.addEventListener("click", (event) => menu.contains(event.target) || (menu.open = false));
   menu.addEventListener("keydown", (event) => key(event, menu));
+  const point = (link) => (link.href = `${project.url}/${link.dataset.path}`);
+  menu.querySelectorAll("a").forEach(point);
+  try {
+    const { formats } = await get("/api/exports");
+    menu.querySelector("ul").prepend(...formats.map(item));
+    menu.querySelectorAll("a").forEach(point);
+  } catch (error) {
+    failed(error);
+  }
+}
+
+function item({ name, title, holds, use }) {
+  return h("li", {}, h("a", { "data-path": `export/${name}` }, `${holds}, ${title}`, h("span.muted", {}, use)));
+}
+
+function chosen(event, menu) {
+  const link = event.target.closest("a");
+  if (!link) return;
+  event.preventDefault();
+  save(link, menu);
 }
 
 async function save(link, menu) {

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import gzip
+import io
 import json
 import xml.etree.ElementTree as ElementTree
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -66,6 +68,7 @@ def test_from_a_sample_to_an_exported_map_and_back_after_a_restart(make_client: 
     assert exported.headers["content-type"] == "application/geo+json"
     assert len(exported.json()["features"]) > 10
     assert ElementTree.fromstring(client.get(f"{url}/export/svg").content).tag.endswith("svg")
+    all_formats(client, url)
     before = client.get(url).json()
     assert before["counts"]["accepted"] == len(above)
     assert (
@@ -79,6 +82,23 @@ def test_from_a_sample_to_an_exported_map_and_back_after_a_restart(make_client: 
     assert client.get(f"{url}/export/geojson").content == exported.content
     listed = client.get("/api/projects").json()["projects"]
     assert [(entry["id"], entry["integrations"]["accepted"]) for entry in listed] == [(id, len(above))]
+
+
+def all_formats(client: Any, url: str) -> None:
+    """Whatever the page offers is saved under the project's name; several files come as one archive."""
+    offered = client.get("/api/exports").json()["formats"]
+    assert {"ros", "dxf", "svg", "png", "geojson", "csv", "tum"} <= {format["name"] for format in offered}
+    for format in offered:
+        saved = client.get(f"{url}/export/{format['name']}")
+        assert saved.status_code == 200
+        assert saved.content
+        assert "attachment" in saved.headers["content-disposition"]
+    archive = zipfile.ZipFile(io.BytesIO(client.get(f"{url}/export/ros?resolution=0.25").content))
+    (yaml, *_), images = ([n for n in archive.namelist() if n.endswith(end)] for end in (".yaml", ".pgm"))
+    assert images
+    assert b"resolution: 0.25\n" in archive.read(yaml)
+    for wrong in ("0", "-1", "nan", "1e9", "fine"):
+        assert client.get(f"{url}/export/ros?resolution={wrong}").status_code == 422
 
 
 def test_a_project_of_several_logs(client: Any, log_bytes: bytes) -> None:

@@ -11,13 +11,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import ezdxf
 import numpy as np
 import pytest
+from map_server import FREE, load_map
 
 import app.server
 from app.cli import main
 from app.resources import program_version, samples_folder
 from segmap.benchmark import is_right
+from segmap.export import FORMATS
 from segmap.integration import DEFAULT_HEURISTIC, match_maps
 from segmap.logs import read_log
 from segmap.parameters import Parameters, preset
@@ -318,13 +321,25 @@ def merged(document: Callable[..., Any], tmp_path: Path) -> Any:
 def test_merge_replay_and_export_agree(merged: Any, run: Run, tmp_path: Path) -> None:
     """The project replays to the hash that merging printed, and exports the same segments."""
     assert run("replay", tmp_path / "map.segmap") == (0, f"{merged['hash']}\n", "")
-    for name in ("svg", "geojson"):
-        status, out, _ = run("export", tmp_path / "map.segmap", "--to", name, "--out", tmp_path / f"again.{name}")
-        assert (status, out) == (0, "")
+    for format in FORMATS.values():
+        to = tmp_path / f"again{format.suffix}"
+        assert run("export", tmp_path / "map.segmap", "--to", format.name, "--out", to)[:2] == (0, "")
+        assert to.stat().st_size > 0
     features = [json.loads((tmp_path / name).read_text())["features"] for name in ("map.geojson", "again.geojson")]
     assert features[0] == features[1]
     assert len(features[0]) == sum(component["segments"] for component in merged["components"])
     assert (tmp_path / "again.svg").read_text().startswith("<svg")
+    assert len(ezdxf.readfile(tmp_path / "again.dxf").modelspace().query("LINE")) == len(features[0])
+
+
+def test_an_exported_map_for_ros_is_free_where_the_robots_were(merged: Any, run: Run, tmp_path: Path) -> None:
+    """Every sensor stands on a free cell; the resolution is the one that was asked for."""
+    where = ("--out", tmp_path / "floor.yaml", "--resolution", 0.1)
+    assert run("export", tmp_path / "map.segmap", "--to", "ros", *where)[0] == 0
+    for number, component in enumerate(merged["components"], start=1):
+        grid = load_map(tmp_path / ("floor.yaml" if number == 1 else f"floor-{number}.yaml"))
+        assert grid.resolution == 0.1
+        assert {grid.at(pose["x"], pose["y"]) for pose in component["scans"].values()} == {FREE}
 
 
 def test_merge_places_or_names_every_scan(merged: Any) -> None:
