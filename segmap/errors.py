@@ -5,6 +5,7 @@
     ├── LogError           a file cannot be read as what it claims to be
     ├── ScanError          ranges, angles or an index that no laser scan can have
     ├── MapError           coordinates that no segment map can have
+    ├── GraphError         an edge that no pose graph can have
     ├── ProjectError       a project file or a decision that cannot be carried out
     │   └── ConflictError  somebody else decided first: look again, then decide
     ├── ExportError        a map that cannot be written in the format asked for
@@ -19,6 +20,7 @@ __all__ = [
     "CancelledError",
     "ConflictError",
     "ExportError",
+    "GraphError",
     "LogError",
     "MapError",
     "ParameterError",
@@ -46,6 +48,10 @@ class ScanError(SegmapError):
 
 class MapError(SegmapError):
     """Coordinates that no segment map can have."""
+
+
+class GraphError(SegmapError):
+    """An edge that no pose graph can have."""
 
 
 class ProjectError(SegmapError):

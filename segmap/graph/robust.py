@@ -1,0 +1,138 @@
+"""Graduated non-convexity: least squares in which an edge that contradicts the others is silenced.
+
+Yang, Antonante, Tzoumas, Carlone, "Graduated Non-Convexity for Robust Spatial Perception" (RA-L 2020), with
+the truncated least squares loss: an edge farther than ``gate`` standard deviations costs ``gate**2`` and no
+more. The loss begins convex and is bent to its true form in rounds of weighted least squares; what comes
+out is then settled, so that weights are 0 or 1 and every part of the graph still hangs on something.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from segmap.graph.arrays import EdgeArrays
+from segmap.graph.edges import Parts
+from segmap.pose import FloatArray, IntArray
+
+__all__ = ["Minimise", "Round", "graduated", "settled", "truncated"]
+
+SHARPENING = 1.4
+"""how much closer to its true form the loss comes each round (Yang et al., Remark 5)"""
+ROUNDS = 100
+FIRST_STEPS = 10
+"""of least squares with every edge; the rounds go on from there with one step each"""
+SETTLING = 20
+STEPS = 5
+"""of least squares after each change of mind when settling"""
+DECIDED = 1e-3
+"""weights nearer to 0 or 1 than this are"""
+
+
+Minimise: TypeAlias = Callable[[FloatArray, FloatArray, int], FloatArray]
+"""Poses, weights of the edges and a number of steps -> poses nearer to the minimum of the weighted squares."""
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """The state after one round of weighted least squares."""
+
+    error: float
+    """the truncated sum of squares"""
+    silenced: int
+    """edges with a weight below 0.5"""
+    poses: FloatArray
+    """(n, 3)"""
+
+
+def truncated(squared: FloatArray, gate: float, free: IntArray) -> float:
+    """The loss: squares of edges, those of ``free`` ones cut at the gate."""
+    cut = squared.copy()
+    cut[free] = np.minimum(cut[free], gate**2)
+    return float(cut.sum())
+
+
+def graduated(
+    edges: EdgeArrays,
+    poses: FloatArray,
+    free: IntArray,
+    gate: float,
+    tell: Callable[[Round], None],
+    minimise: Minimise,
+) -> FloatArray:
+    """Poses (n, 3) after the rounds, begun at some poses; ``free`` are the edges that can be silenced."""
+    weights = np.ones(len(edges))
+    poses = minimise(poses, weights, FIRST_STEPS)
+    squared = edges.squares(poses)
+    convexity = _first_convexity(float(squared[free].max(initial=0.0)), gate)
+    for _ in range(ROUNDS):
+        weights[free] = _weights(squared[free], gate, convexity)
+        poses = minimise(poses, weights, 1)
+        squared = edges.squares(poses)
+        tell(Round(truncated(squared, gate, free), int((weights < 0.5).sum()), poses))
+        if (np.minimum(weights, 1.0 - weights) <= DECIDED).all():
+            break
+        convexity *= SHARPENING
+    return poses
+
+
+def _first_convexity(worst: float, gate: float) -> float:
+    """mu at which the loss is convex for residuals up to the worst (Remark 5); large where none is beyond the gate."""
+    return gate**2 / (2.0 * worst - gate**2) if 2.0 * worst > gate**2 else 1.0 / DECIDED**2
+
+
+def _weights(squared: FloatArray, gate: float, convexity: float) -> FloatArray:
+    """Equation 14 of Yang et al.: 1 well inside the gate, 0 well beyond it, between the two in between."""
+    inner = convexity / (convexity + 1.0) * gate**2
+    outer = (convexity + 1.0) / convexity * gate**2
+    between = gate * np.sqrt(convexity * (convexity + 1.0) / np.maximum(squared, inner)) - convexity
+    return np.where(squared <= inner, 1.0, np.where(squared >= outer, 0.0, between))
+
+
+def settled(
+    edges: EdgeArrays,
+    poses: FloatArray,
+    free: IntArray,
+    gate: float,
+    tell: Callable[[Round], None],
+    minimise: Minimise,
+) -> tuple[FloatArray, FloatArray]:
+    """Poses and weights of 0 or 1 at which every free edge counts exactly if it is within the gate.
+
+    Where silencing would cut a part off, an edge across the cut counts all the same: it costs nothing, as
+    nothing else holds the part.
+    """
+    weights, best = np.full(len(edges), -1.0), np.inf
+    result = poses, weights
+    for _ in range(SETTLING):
+        new = _kept(edges, poses, free, gate)
+        if (new == weights).all():
+            break
+        weights, poses = new, minimise(poses, new, STEPS)
+        loss = truncated(edges.squares(poses), gate, free)
+        tell(Round(loss, int((new < 0.5).sum()), poses))
+        if loss < best:
+            best, result = loss, (poses, new)
+    return result
+
+
+def _kept(edges: EdgeArrays, poses: FloatArray, free: IntArray, gate: float) -> FloatArray:
+    """1 for edges that count, (m,)."""
+    weights, squared = np.ones(len(edges)), edges.squares(poses)
+    weights[free] = squared[free] <= gate**2
+    _reattach(edges, squared, weights, len(poses))
+    return weights
+
+
+def _reattach(edges: EdgeArrays, squared: FloatArray, weights: FloatArray, count: int) -> None:
+    """Let edges count again until the graph hangs together, the nearest to the gate first."""
+    parts = Parts(count)
+    for i in np.flatnonzero(weights > 0.0):
+        parts.join(int(edges.first[i]), int(edges.second[i]))
+    silenced = np.flatnonzero(weights <= 0.0)
+    for i in silenced[np.argsort(squared[silenced], kind="stable")]:
+        if parts.join(int(edges.first[i]), int(edges.second[i])):
+            weights[i] = 1.0

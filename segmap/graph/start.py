@@ -1,0 +1,75 @@
+"""Where poses begin: composed along the edges that can be relied on most."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from segmap.graph.edges import Edge, Parts
+from segmap.pose import FloatArray, Pose2
+from segmap.scans import ScanId
+
+__all__ = ["first_poses", "uncertainty"]
+
+ARM = 5.0
+"""metres; how far from a scan an error of its heading is felt"""
+
+
+def uncertainty(edge: Edge) -> float:
+    """Variance of what an edge places, at the end of an arm, square metres."""
+    return edge.covariance[0][0] + edge.covariance[1][1] + ARM**2 * edge.covariance[2][2]
+
+
+def first_poses(
+    scans: Sequence[ScanId],
+    edges: Sequence[Edge],
+    support: FloatArray,
+    initial: Mapping[ScanId, Pose2],
+) -> FloatArray:
+    """Poses (n, 3) of the scans of one component in the frame of the first.
+
+    ``initial`` poses are taken; what lacks one is composed along a spanning tree: trusted edges first,
+    then by ``support`` (how much speaks for each edge, large is good), then the surest.
+    """
+    places = {scan: place for place, scan in enumerate(scans)}
+    links: list[list[tuple[int, Pose2]]] = [[] for _ in scans]
+    for edge in _tree(edges, places, support, initial):
+        a, b = places[edge.first], places[edge.second]
+        links[a].append((b, edge.T_1_2))
+        links[b].append((a, edge.T_1_2.inverse()))
+    held = {places[scan]: pose for scan, pose in initial.items() if scan in places}
+    poses = _spread(links, held or {0: Pose2.identity()})
+    return _in_first_frame(np.array([tuple(poses[place]) for place in range(len(scans))]))
+
+
+def _tree(
+    edges: Sequence[Edge], places: Mapping[ScanId, int], support: FloatArray, initial: Mapping[ScanId, Pose2]
+) -> list[Edge]:
+    """Edges that reach every scan from those with initial poses, without a loop."""
+    parts = Parts(len(places))
+    held = [places[scan] for scan in initial if scan in places]
+    for place in held[1:]:
+        parts.join(held[0], place)
+    order = sorted(
+        range(len(edges)), key=lambda i: (not edges[i].trusted, -float(support[i]), uncertainty(edges[i]), i)
+    )
+    return [edges[i] for i in order if parts.join(places[edges[i].first], places[edges[i].second])]
+
+
+def _spread(links: Sequence[Sequence[tuple[int, Pose2]]], held: Mapping[int, Pose2]) -> dict[int, Pose2]:
+    poses, waiting = dict(held), deque(sorted(held))
+    while waiting:
+        here = waiting.popleft()
+        for there, T_here_there in links[here]:
+            if there not in poses:
+                poses[there] = poses[here] @ T_here_there
+                waiting.append(there)
+    return poses
+
+
+def _in_first_frame(poses: FloatArray) -> FloatArray:
+    first = Pose2(*poses[0]).inverse()
+    places = first @ poses[:, :2]
+    return np.column_stack((places, (poses[:, 2] + first.theta + np.pi) % (2.0 * np.pi) - np.pi))
