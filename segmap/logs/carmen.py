@@ -3,11 +3,13 @@
 ::
 
     FLASER n r1..rn x y theta x y theta time host time        also RLASER; laser pose, then robot pose
+    LASER3 n r1..rn time host time                            older; no pose
     ROBOTLASER1 type start fov step max_range accuracy remission n r1..rn m e1..em
                 laser x y theta, robot x y theta, tv rv safety safety turn time host time
     RAWLASER1   type start fov step max_range accuracy remission n r1..rn m e1..em time host time
 
-The digit may be any. RAWLASER records are taken only where there are no others: a log that has
+The digit may be any; ROBOTLASER and RAWLASER were first written without the word ``remission``, the
+mode of measuring it. RAWLASER records are taken only where there are no others: a log that has
 both writes each sweep twice, raw and with the robot's pose.
 """
 
@@ -15,6 +17,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import islice
 
 from segmap.logs.records import Format, Problems, Record, half_turn
@@ -24,7 +27,7 @@ from segmap.logs.text import MalformedError, Parser, a_pose, count_of, first_wor
 __all__ = ["CARMEN"]
 
 KNOWN = re.compile(
-    rb"\"?#.*|PARAM|SYNC|ODOM|TRUEPOS|NEFF|LASER[0-9]|VERTEX\w*|EDGE\w*|EQUIV|FIX|PARAMS\w*|POSITION|(GLOBAL)?LOCALIZE\w*|CORR\w*|SCANMARK"
+    rb"\"?#.*|PARAM|SYNC|ODOM|TRUEPOS|NEFF|REMISSION\w*LASER[0-9]?|VERTEX\w*|EDGE\w*|EQUIV|FIX|PARAMS\w*|POSITION|(GLOBAL)?LOCALIZE\w*|CORR\w*|SCANMARK"
     rb"|GPS\w*|NMEA\w*|SONAR\w*|BUMPER\w*|BASE\w*|IMU\w*|XSENS\w*|INERTIAL\w*|ARM\w*|PANTILT\w*|VISION\w*|DYNAMIXEL\w*|MARKER\w*"
 )
 SETTINGS = ("start angle", "field of view", "angle step", "maximum range")
@@ -49,8 +52,34 @@ def _laser(words: Sequence[bytes], line: int) -> Record:
     )
 
 
+def _old_laser(words: Sequence[bytes], line: int) -> Record:
+    beams = count_of(words, 1, "readings")
+    first_angle, angle_step = half_turn(beams)
+    rest = words[2 + beams :]
+    if len(rest) > 3:
+        raise MalformedError(f"{shown(words[0])} ends with {len(rest)} words after its readings instead of 3")
+    return Record(
+        sensor=words[0].decode(),
+        line=line,
+        ranges=numbers(words[2 : 2 + beams], "reading"),
+        first_angle=first_angle,
+        angle_step=angle_step,
+        time=number(rest[0], "time") if rest else None,
+    )
+
+
 def _configured(words: Sequence[bytes], line: int, poses: int) -> Record:
     """A record that says how its sensor is set; ``poses``: how many words of poses and motion follow."""
+    try:
+        return _configured_by(words, line, poses)
+    except MalformedError as error:
+        older = [*words[:7], b"0", *words[7:]]
+        with suppress(MalformedError):
+            return _configured_by(older, line, poses)
+        raise error
+
+
+def _configured_by(words: Sequence[bytes], line: int, poses: int) -> Record:
     beams = count_of(words, 8, "readings")
     _, start, _, step, reach = (number(word, what) for word, what in zip(words[1:6], ("type", *SETTINGS), strict=True))
     ranges = numbers(words[9 : 9 + beams], "reading")
@@ -81,6 +110,7 @@ def _raw_laser(words: Sequence[bytes], line: int) -> Record:
 PARSERS: dict[bytes, Parser] = {
     b"FLASER": _laser,
     b"RLASER": _laser,
+    **{b"LASER%d" % digit: _old_laser for digit in range(10)},
     **{b"ROBOTLASER%d" % digit: _robot_laser for digit in range(10)},
     **{b"RAWLASER%d" % digit: _raw_laser for digit in range(10)},
 }

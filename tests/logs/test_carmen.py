@@ -67,6 +67,26 @@ def test_every_laser_counts(flaser, robotlaser):
     assert [scan.ranges.tolist() for scan in log] == [[1.0], [2.0], [3.0], [4.0]]
 
 
+@pytest.mark.parametrize("rest", ["", "12.5 host 13"])
+def test_old_third_laser(flaser, rest):
+    """LASER3 and its like have readings and a time, and no pose."""
+    log = read(flaser(1.0, 2.0), f"LASER3 181 {'2.5 ' * 181} {rest}")
+    assert (len(log), log.problems) == (2, ())
+    assert (log[1].logged_pose, log[1].time) == (None, 12.5 if rest else None)
+    assert math.degrees(log[1].angle_step) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("word", ["ROBOTLASER2", "RAWLASER4"])
+def test_records_without_a_mode_of_remission(robotlaser, word):
+    """Earlier CARMEN wrote one word less before the readings; both are told apart by what follows."""
+    new = robotlaser(1.25, 2.5, 3.75, word=word, remissions=(1, 2))
+    words = new.split()
+    old, twin = (read(line)[0] for line in (" ".join((*words[:7], *words[8:])), new))
+    assert old.ranges.tolist() == [1.25, 2.5, 3.75]
+    assert (old.first_angle, old.angle_step, old.max_range) == (twin.first_angle, twin.angle_step, twin.max_range)
+    assert (old.time, old.logged_pose) == (twin.time, twin.logged_pose)
+
+
 def test_raw_records(robotlaser):
     """A raw record is a scan, unless the log has the same sweep with a pose."""
     raw = robotlaser(1.0, 2.0, word="RAWLASER1")
@@ -99,6 +119,7 @@ def test_graph_log(robotlaser):
         ("ROBOTLASER1 0 -1.5 3 0 50 0.1 0 2 1 1 0 " + "0 " * 11 + "7 host 8", "angle step of a scan must not be 0"),
         ("ROBOTLASER1 0 -1.5 3 0.01 50 0.1 0 1 1", "ends before the number of remissions"),
         ("ROBOTLASER1 0 -1.5 3 0.01 50 0.1 0 1 1 0 1 2 3", "ends with 3 words after its readings instead of 14"),
+        ("LASER3 1 2 3 4 5 6", "ends with 4 words after its readings instead of 3"),
         ("FLASRE 3 1 2 3", "'FLASRE' starts no record of this format"),
     ],
 )
