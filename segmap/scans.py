@@ -131,9 +131,11 @@ class LogProblem:
     line: int
     """line of the file, from 1; for binary files the number of the record"""
     reason: str
+    unit: str = "line"
+    """what ``line`` counts"""
 
     def __str__(self) -> str:
-        return f"line {self.line}: {self.reason}"
+        return f"{self.unit} {self.line}: {self.reason}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +150,8 @@ class LaserLog(Sequence[LaserScan]):
     """metres; the reading that stands for "nothing seen" in this log, as found in its data"""
     problems: tuple[LogProblem, ...] = field(default=())
     """lines that were left out, and why"""
+    topic: str = ""
+    """of a recording of several topics, the one these scans were published on"""
 
     def __len__(self) -> int:
         return len(self.scans)

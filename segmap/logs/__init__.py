@@ -14,15 +14,18 @@ import numpy as np
 from segmap.errors import LogError, ScanError
 from segmap.logs.carmen import CARMEN
 from segmap.logs.dpslam import DP_SLAM
+from segmap.logs.mcap import MCAP
 from segmap.logs.no_return import LONGEST, SHORTEST, NoReturn, no_return
 from segmap.logs.records import Format, Problems, Record
-from segmap.logs.source import Limits, LogFile, LogSource, base_name
-from segmap.logs.text import shown
+from segmap.logs.rosbag1 import ROS_1_BAG
+from segmap.logs.rosbag2 import ROS_2_BAG
+from segmap.logs.source import Limits, LogFile, LogSource, base_name, name_of
+from segmap.logs.text import printable, shown
 from segmap.scans import LaserLog, LaserScan
 
-__all__ = ["FORMATS", "Limits", "LogSource", "base_name", "read_log"]
+__all__ = ["FORMATS", "Limits", "LogSource", "base_name", "read_log", "read_logs", "recognised"]
 
-FORMATS: tuple[Format, ...] = (CARMEN, DP_SLAM)
+FORMATS: tuple[Format, ...] = (CARMEN, DP_SLAM, ROS_1_BAG, ROS_2_BAG, MCAP)
 """Every format read; the first that recognises a file reads it."""
 
 FAR = 100.0
@@ -37,34 +40,82 @@ PACKED = {
 }
 
 
-def read_log(source: LogSource, name: str | None = None, limits: Limits | None = None) -> LaserLog:
+def read_log(
+    source: LogSource, name: str | None = None, limits: Limits | None = None, topic: str | None = None
+) -> LaserLog:
     """Read a laser log from a path, bytes or a binary stream, plain or gzipped.
 
     Scan i is the i-th laser record that can be read, in file order, from 0. A record that cannot
     be read is left out and told of in ``problems`` (at most 100, and how many more), and never
     costs the others; what was read of a damaged or cut off file is kept. A log without scans is
     a log of length 0 with a problem that says so. ``name`` stands for the file in messages, and
-    its last part names the log; it is never opened.
+    its last part names the log; it is never opened. ``topic`` chooses one of a bag's laser topics.
+
+    Raises:
+        LogError: the file cannot be opened, is of no known format, or grows beyond ``limits``; it
+            is a bag of several laser topics, and none was chosen; or it has no such topic.
+    """
+    logs = read_logs(source, name, limits)
+    held = {log.topic: log for log in logs if log.topic}
+    if topic is None and len(logs) == 1:
+        return logs[0]
+    told = ", ".join(f"{log.topic} ({len(log)} scans)" for log in held.values()) or "none"
+    file = base_name(name or name_of(source))
+    if topic is None:
+        raise LogError(f"{file} holds several laser topics, {told}: choose one of them, as in {file}#{logs[0].topic}.")
+    if topic not in held:
+        raise LogError(f"{file} has no laser topic {printable(topic)}: it has {told}.")
+    return held[topic]
+
+
+def read_logs(source: LogSource, name: str | None = None, limits: Limits | None = None) -> tuple[LaserLog, ...]:
+    """The same for all that a file holds: a bag of several laser topics gives a log for each, in order of appearance.
 
     Raises:
         LogError: the file cannot be opened, is of no known format, or grows beyond ``limits``.
     """
-    problems = Problems()
     with LogFile(source, name, limits) as file:
         head = file.head()
         if not head.strip():
-            return _empty(file, problems)
+            return (_empty(file, Problems()),)
         format = _format_of(head, file)
+        problems = Problems(unit=format.unit)
         records = list(islice(format.records(file, problems), file.limits.scans + 1))
         if len(records) > file.limits.scans:
             raise LogError(f"{file.name} holds more than {file.limits.scans} scans: split it and read each part.")
         if file.damage:
-            problems.add(_last_line(records), _damage(file))
+            problems.add(_last_line(records), _damage(file, format))
+    if not records:
+        return (_log(file.name, format, records, problems),)
+    by_topic: dict[str, list[Record]] = defaultdict(list)
+    for record in records:
+        by_topic[record.sensor if format.topics else ""].append(record)
+    return _logs(file.name, format, by_topic, problems)
+
+
+def _logs(
+    name: str, format: Format, by_topic: Mapping[str, Sequence[Record]], problems: Problems
+) -> tuple[LaserLog, ...]:
+    """A log for each topic; what concerns the file is told with the first one."""
+    logs = []
+    for topic, records in by_topic.items():
+        called = name if len(by_topic) == 1 else f"{name} {topic.strip('/').replace('/', '.')}"
+        logs.append(_log(called, format, records, problems, topic))
+        problems = Problems(unit=format.unit)
+    return tuple(logs)
+
+
+def _log(name: str, format: Format, records: Sequence[Record], problems: Problems, topic: str = "") -> LaserLog:
     _check_unit(records, problems)
     scans = _scans(records, silence := _silence(records), problems)
     if not scans:
-        problems.add(1, f"{file.name} is a {format.name} log without laser scans: choose a log that has some")
-    return LaserLog(file.name, scans, format.name, _main(records, silence), problems.all())
+        problems.add(1, f"{name} is a {format.name} log without laser scans: choose a log that has some")
+    return LaserLog(name, scans, format.name, _main(records, silence), problems.all(), topic)
+
+
+def recognised(head: bytes) -> str | None:
+    """The name of the format that the first bytes of a file, decompressed, belong to; None: of no known one."""
+    return next((format.name for format in FORMATS if format.recognises(head)), None)
 
 
 def _empty(file: LogFile, problems: Problems) -> LaserLog:
@@ -94,8 +145,11 @@ def _last_line(records: Sequence[Record]) -> int:
     return records[-1].line if records else 1
 
 
-def _damage(file: LogFile) -> str:
-    return f"the compressed data are {file.damage} after this line; what came before was read: fetch the file again"
+def _damage(file: LogFile, format: Format) -> str:
+    return (
+        f"the compressed data are {file.damage} after this {format.unit};"
+        " what came before was read: fetch the file again"
+    )
 
 
 def _check_unit(records: Sequence[Record], problems: Problems) -> None:

@@ -45,6 +45,8 @@ class Problems:
 
     limit: int = 100
     """how many are kept"""
+    unit: str = "line"
+    """what is counted: lines of text, messages of a bag"""
     count: int = 0
     kept: list[LogProblem] = field(default_factory=list)
     _first_dropped: int = 0
@@ -53,7 +55,7 @@ class Problems:
         """Note that something on a line, from 1, was left out."""
         self.count += 1
         if len(self.kept) < self.limit:
-            self.kept.append(LogProblem(line, reason))
+            self.kept.append(LogProblem(line, reason, self.unit))
         elif not self._first_dropped:
             self._first_dropped = line
 
@@ -62,7 +64,8 @@ class Problems:
         rest = self.count - len(self.kept)
         if not rest:
             return tuple(self.kept)
-        return (*self.kept, LogProblem(self._first_dropped, f"from here on there are {rest} more problems like these"))
+        told = f"from here on there are {rest} more problems like these"
+        return (*self.kept, LogProblem(self._first_dropped, told, self.unit))
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +80,10 @@ class Format:
     """whether the first bytes of a file, decompressed, are this format's"""
     records: Callable[[LogFile, Problems], Iterable[Record]]
     """the laser records of a file in file order; what cannot be read goes to the problems"""
+    unit: str = "line"
+    """what its records are counted in, for messages"""
+    topics: bool = False
+    """whether each of its sensors is a log of its own, called by its topic"""
 
 
 def half_turn(beams: int) -> tuple[float, float]:

@@ -11,15 +11,16 @@ import math
 import os
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
 from typing import IO, Any, TypeAlias
 
 from segmap.errors import LogError
 
-__all__ = ["Limits", "LogFile", "LogSource", "base_name"]
+__all__ = ["Limits", "LogFile", "LogSource", "base_name", "name_of"]
 
 LogSource: TypeAlias = str | os.PathLike[str] | bytes | bytearray | memoryview | IO[bytes]
 """A path, the bytes themselves, or a binary stream (read from where it stands, and not closed)."""
@@ -67,8 +68,9 @@ class LogFile:
 
     def __init__(self, source: LogSource, name: str | None = None, limits: Limits | None = None) -> None:
         self.limits = limits or Limits()
-        self.name = base_name(name or _name_of(source))
+        self.name = base_name(name or name_of(source))
         self._stream, self._ours = _opened(source, self.name)
+        self._path = Path(source) if isinstance(source, str | os.PathLike) else None
         self._bytes = _Bounded(self._stream, self.name, self.limits)
         self._buffer = io.BufferedReader(self._bytes, HEAD)
 
@@ -105,12 +107,49 @@ class LogFile:
                 continue
             yield number, line.removeprefix(b"\xef\xbb\xbf") if number == 1 else line
 
+    def read(self, size: int) -> bytes:
+        """The next bytes; fewer than ``size`` at the end."""
+        pieces = []
+        while size > 0 and (piece := self._buffer.read(min(size, HEAD))):
+            pieces.append(piece)
+            size -= len(piece)
+        return b"".join(pieces)
+
+    def skip(self, size: int) -> bool:
+        """Pass over the next bytes; whether there were as many."""
+        while size > 0 and (piece := self._buffer.read(min(size, HEAD))):
+            size -= len(piece)
+        return size <= 0
+
+    def expanded(self, size: int) -> None:
+        """Count bytes that came out of something compressed inside the file.
+
+        Raises:
+            LogError: together they are more than the limits allow.
+        """
+        self._bytes.expanded(size)
+
+    @contextmanager
+    def on_disk(self) -> Iterator[Path]:
+        """All of the file as a file that other libraries can open; a copy where it is no plain file."""
+        if self._path and not self._bytes.compressed:
+            self._bytes.elsewhere(self._path.stat().st_size)
+            yield self._path
+            return
+        with TemporaryDirectory(prefix="segmap-") as folder:
+            copy = Path(folder) / "log"
+            with copy.open("wb") as target:
+                while piece := self.read(HEAD):
+                    target.write(piece)
+            yield copy
+
     def _finish(self, line: bytes) -> None:
         while line and not line.endswith(b"\n"):
             line = self._buffer.readline(HEAD)
 
 
-def _name_of(source: LogSource) -> str:
+def name_of(source: LogSource) -> str:
+    """What a source is called; a stream may have no name."""
     if isinstance(source, str | os.PathLike):
         return os.fspath(source)
     name = getattr(source, "name", None)
@@ -151,7 +190,12 @@ class _Bounded(io.RawIOBase):
         start = self._compressed.take(len(GZIP))
         self._inflated = _Inflated(self._compressed, start) if start == GZIP else None
         self._start = b"" if self._inflated else start
-        self._size = 0
+        self._size = self._expanded = 0
+
+    @property
+    def compressed(self) -> bool:
+        """Whether the whole of the stream is."""
+        return self._inflated is not None
 
     @property
     def damage(self) -> str | None:
@@ -177,12 +221,23 @@ class _Bounded(io.RawIOBase):
         self._check(len(piece))
         return piece
 
+    def elsewhere(self, size: int) -> None:
+        """Count the whole of the file, which somebody else reads."""
+        self._compressed.taken, self._size = size, 0
+        self._check(size)
+
+    def expanded(self, size: int) -> None:
+        """Count bytes that came out of something compressed inside."""
+        self._expanded += size
+        self._check(size)
+
     def _check(self, more: int) -> None:
         self._size += more
         if self._size > self._limits.size:
             size = _mebibytes(self._limits.size)
             raise LogError(f"{self._name} holds more than {size}: split it into several logs and read each.")
-        ratio = self._size / max(self._compressed.taken, 1) if self._inflated else 0.0
+        grows = self._inflated or self._expanded
+        ratio = self._size / max(self._compressed.taken, 1) if grows else 0.0
         if self._size > HARMLESS and ratio > self._limits.ratio:
             raise LogError(
                 f"{self._name} grows {math.floor(ratio)} times when decompressed, more than any laser log does:"

@@ -13,7 +13,18 @@ from segmap.logs.records import Problems, Record
 from segmap.logs.source import LogFile
 from segmap.pose import FloatArray, Pose2
 
-__all__ = ["MalformedError", "Parser", "a_pose", "count_of", "first_words", "number", "numbers", "records_of", "shown"]
+__all__ = [
+    "MalformedError",
+    "Parser",
+    "a_pose",
+    "count_of",
+    "first_words",
+    "number",
+    "numbers",
+    "printable",
+    "records_of",
+    "shown",
+]
 
 Parser: TypeAlias = Callable[[Sequence[bytes], int], Record | None]
 """Takes the words of a line and its number; a line that is no scan gives None."""
@@ -106,6 +117,11 @@ def _is_number(word: bytes) -> bool:
     except ValueError:
         return False
     return b"_" not in word
+
+
+def printable(text: str) -> str:
+    """A text of a file as one printable line of reasonable length."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text[:200])
 
 
 def shown(word: bytes) -> str:
