@@ -43,11 +43,11 @@ class LogPairs:
         return extract(self.log.scan(pair.i), parameters), extract(self.log.scan(pair.j), parameters)
 
 
-def arguments(about: str | None) -> argparse.ArgumentParser:
-    """A parser with the folders of the logs and of their pairs."""
+def arguments(about: str | None, pairs: str = "--pairs") -> argparse.ArgumentParser:
+    """A parser with the folders of the logs and of their pairs; ``pairs`` is the latter's option."""
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--logs", type=Path, default=SHARED / "datasets", help="folder of the logs")
-    parser.add_argument("--pairs", type=Path, default=SHARED / "benchmarks" / "pairs", help="folder of the pair sets")
+    parser.add_argument(pairs, type=Path, default=SHARED / "benchmarks" / "pairs", help="folder of the pair sets")
     return parser
 
 
