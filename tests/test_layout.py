@@ -43,6 +43,7 @@ ORDER = (
     "simulate",
     "export",
     "benchmark",
+    "pair_pictures",
 )
 """The data flow: a module imports only from those before it, or from its own package."""
 WEB = {"app", "fastapi", "starlette", "uvicorn", "viser", "httpx", "websockets", "typer", "rich"}
