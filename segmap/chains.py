@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+import numpy as np
 
 from segmap.evaluation import matching_values
 from segmap.parameters import Parameters
@@ -50,8 +49,14 @@ def matching_chains(
 
 
 def components(pairs: IntArray, n_1: int, n_2: int) -> IntArray:
-    """The connected component of each pair, in the graph with the segments of both maps as nodes."""
-    nodes = n_1 + n_2
-    links = coo_array(([True] * len(pairs), (pairs[:, 0], n_1 + pairs[:, 1])), shape=(nodes, nodes))
-    labels: IntArray = connected_components(links, directed=False)[1]
-    return labels[pairs[:, 0]]
+    """The connected component of each pair, in the graph with the segments of both maps as nodes (union-find)."""
+    parents = list(range(n_1 + n_2))
+
+    def root(node: int) -> int:
+        while parents[node] != node:
+            parents[node] = node = parents[parents[node]]
+        return node
+
+    for i, j in pairs.tolist():
+        parents[root(n_1 + j)] = root(i)
+    return np.array([root(i) for i in pairs[:, 0].tolist()], dtype=np.int64)

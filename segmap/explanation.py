@@ -7,19 +7,19 @@ kinds of evidence to the score of verified mode.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import TypeAdapter
 
 from segmap._kernels import TOUCH
-from segmap._sight_kernels import nearest_segments
+from segmap._sight_kernels import UNSEEN, nearest_segments
 from segmap.chains import components
 from segmap.evaluation import LEAST_MATCH, evaluate, matching_values
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
 from segmap.segments import SegmentMap
-from segmap.visibility import CLASS_NAMES, Evidence, Sighting, classes, evidence, score, sighting
+from segmap.visibility import CLASS_NAMES, Evidence, Sighting, classes, evidence, look, score, sighting
 
 __all__ = [
     "ChainTerm",
@@ -90,7 +90,7 @@ class ReturnTerm:
     seen: str
     """supported, contradicted, shadowed or unseen"""
     width: float
-    """metres of wall it stands for"""
+    """metres of wall it stands for; what several scans of a map saw is shared among them"""
     score: float
     """metres it adds to the score, or takes"""
     segment: int | None
@@ -258,31 +258,33 @@ def _seen(
 ) -> Explanation:
     """The explanation, with what lines of sight add."""
     found = classes(*seen, told.T_1_2, parameters)
-    totals = _totals(np.concatenate(found[::-1]), np.concatenate((seen[1].points[:, 2], seen[0].points[:, 2])))
-    sides = [_side(*side, parameters) for side in zip(maps, seen, found, strict=True)]
-    terms = dict(zip(CLASS_NAMES, map(float, score(np.diag(totals), parameters)), strict=True))
-    return Explanation(
-        told.T_1_2,
-        told.value,
-        told.discarded,
-        told.pairs,
-        told.chains,
-        told.crossings,
-        float(score(totals[None], parameters)[0]),
-        terms,
-        evidence(totals),
-        (sides[0], sides[1]),
+    widths = tuple(_counted(*side) for side in zip(seen, found, strict=True))
+    totals = look(*seen, np.array([tuple(told.T_1_2)]), parameters)
+    sides = [_side(*side, parameters) for side in zip(maps, seen, found, widths, strict=True)]
+    terms = dict(zip(CLASS_NAMES, map(float, score(np.diag(totals[0]), parameters)), strict=True))
+    return replace(
+        told,
+        score=float(score(totals, parameters)[0]),
+        terms=terms,
+        evidence=evidence(totals[0]),
+        sights=(sides[0], sides[1]),
     )
 
 
-def _totals(found: IntArray, widths: FloatArray) -> FloatArray:
-    """Metres in each class, (4,), summed in order."""
-    return np.bincount(found, widths, len(CLASS_NAMES)).astype(np.float64)
+def _counted(seen: Sighting, found: IntArray) -> FloatArray:
+    """The metres each return counts for: its width; of a map of several scans no more is unseen than of one."""
+    widths = seen.points[:, 2].copy()
+    unseen = found == UNSEEN
+    if len(seen.sensors) > 1 and unseen.any():
+        counted = max(0.0, seen.mean - widths[~unseen].sum())
+        widths[unseen] *= min(1.0, counted / widths[unseen].sum())
+    return widths
 
 
-def _side(segment_map: SegmentMap, seen: Sighting, found: IntArray, parameters: Parameters) -> MapSight:
+def _side(
+    segment_map: SegmentMap, seen: Sighting, found: IntArray, widths: FloatArray, parameters: Parameters
+) -> MapSight:
     """One map's returns, one by one and by segment."""
-    widths = seen.points[:, 2]
     weights = score(np.eye(len(CLASS_NAMES)), parameters)
     owners = _owners(segment_map, seen.points, parameters)
     columns = zip(seen.points[:, :2].tolist(), found.tolist(), widths.tolist(), owners.tolist(), strict=True)
@@ -292,7 +294,8 @@ def _side(segment_map: SegmentMap, seen: Sighting, found: IntArray, parameters: 
     )
     segments = []
     for owner in [*np.unique(owners[owners >= 0]), -1]:
-        totals = _totals(found[owners == owner], widths[owners == owner])
+        own = owners == owner
+        totals = np.bincount(found[own], widths[own], len(CLASS_NAMES)).astype(np.float64)
         segments.append(SegmentTerm(_or_none(owner), evidence(totals), float(totals @ weights)))
     return MapSight(returns, tuple(segments))
 

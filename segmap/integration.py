@@ -16,11 +16,11 @@ from segmap.evaluation import best, evaluate, matching_values
 from segmap.fusion import Fusion, fuse
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
-from segmap.refinement import Uncertainty, uncertainty
+from segmap.refinement import Uncertainty, uncertainties
 from segmap.segments import SegmentMap
 from segmap.verdict import Findings, Verdict, confidence, findings, judge
-from segmap.verification import Verified, verify
-from segmap.visibility import Evidence, Sighting, evidence, sighting
+from segmap.verification import Verified, Views, verify, views
+from segmap.visibility import Evidence, evidence
 
 __all__ = [
     "AUTOMATIC",
@@ -287,8 +287,8 @@ def _angles(found: Candidates, row: int) -> tuple[tuple[int, int], tuple[int, in
 
 def _verified(task: _Task) -> _Found:
     """The heuristic's candidates on the evidence; ``automatic`` goes on until the verdict is clear."""
-    seen_1, seen_2 = sighting(task.map_1), sighting(task.map_2)
-    if seen_1 is None or seen_2 is None:
+    seen = views(task.map_1, task.map_2, task.parameters)
+    if seen is None:
         return _as_the_paper(replace(task, heuristic=_by_value(task.heuristic)))
     found, kept, discarded = Candidates.joined([]), None, 0
     ranked: tuple[Candidate, ...] = ()
@@ -296,10 +296,10 @@ def _verified(task: _Task) -> _Found:
         block = Candidates.joined(list(_checked(candidates(task.map_1, task.map_2, heuristic, task.parameters), task)))
         rows, crossing = _worth_judging(task, block)
         if len(rows):
-            fresh = verify(seen_1, seen_2, block.poses[rows], task.parameters).placed(len(found) + rows)
+            fresh = verify(seen, block.poses[rows], task.parameters).placed(len(found) + rows)
             kept = kept.joined(fresh, task.parameters) if kept else fresh
         found, discarded = Candidates.joined([found, block]), discarded + crossing
-        ranked = _ranked(task, found, kept, seen_1, seen_2) if kept else ()
+        ranked = _ranked(task, found, kept, seen) if kept else ()
         if ranked and _judgement(ranked, task.parameters)[0] is Verdict.ACCEPTED:
             break
     return _Found(ranked, len(found), discarded, found.draws)
@@ -327,22 +327,22 @@ def _worth_judging(task: _Task, block: Candidates) -> tuple[IntArray, int]:
     return np.sort(best(values, most)), int(np.isnan(values).sum())
 
 
-def _ranked(
-    task: _Task, found: Candidates, kept: Verified, seen_1: Sighting, seen_2: Sighting
-) -> tuple[Candidate, ...]:
+def _ranked(task: _Task, found: Candidates, kept: Verified, seen: Views) -> tuple[Candidate, ...]:
     """The distinct refined candidates, best first."""
+    map_1, map_2, parameters = task.map_1, task.map_2, task.parameters
+    held = uncertainties(map_1, map_2, seen.seen_1, seen.seen_2, kept.poses, parameters)
     return tuple(
         Candidate(
             T_1_2,
-            float(matching_values(task.map_1, task.map_2, T_1_2, task.parameters)[1].sum()),
+            float(matching_values(map_1, map_2, T_1_2, parameters)[1].sum()),
             *_angles(found, int(row)),
             index=int(row),
             score=float(score),
             evidence=evidence(totals),
-            uncertainty=uncertainty(task.map_1, task.map_2, seen_1, seen_2, T_1_2, task.parameters),
+            uncertainty=how_well,
         )
-        for row, T_1_2, totals, score in zip(
-            kept.rows, (Pose2(*pose) for pose in kept.poses), kept.totals, kept.scores, strict=True
+        for row, T_1_2, totals, score, how_well in zip(
+            kept.rows, (Pose2(*pose) for pose in kept.poses), kept.totals, kept.scores, held, strict=True
         )
     )
 

@@ -133,7 +133,7 @@ class Parameters(BaseModel):
         0.2, "", "What a metre that the other map cannot judge takes from the score.", ge=0.0, le=100.0
     )
     judged_candidates: int = _parameter(
-        1500, "", "How many of the best candidates by value are judged by their lines of sight.", ge=1, le=1000000
+        20000, "", "How many of the best candidates by value are judged by their lines of sight.", ge=1, le=1000000
     )
     refined_candidates: int = _parameter(
         48, "", "How many distinct ones of these are refined and judged again.", ge=1, le=10000

@@ -1,7 +1,8 @@
 """Candidates -> distinct, refined and judged by lines of sight: what verified mode adds to the paper.
 
-From coarse to fine: many candidates are judged by a few returns each; the distinct ones among the best are
-refined and judged by more; the best of those are refined again and judged by all returns.
+From coarse to fine: all candidates are looked up in the maps' fields by some returns each; the distinct ones
+among the best are refined and looked up by all; the best of those are refined again, and judged by the lines
+of sight themselves.
 """
 
 from __future__ import annotations
@@ -11,15 +12,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from segmap.fields import Field, field, look_up, refined
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray
-from segmap.refinement import distinct, refined
-from segmap.visibility import Sighting, look, score, thinned
+from segmap.refinement import distinct
+from segmap.segments import SegmentMap
+from segmap.visibility import Sighting, look, score, sighting, thinned
 
-__all__ = ["Verified", "verify"]
+__all__ = ["Verified", "Views", "verify", "views"]
 
-COARSE, MIDDLE, FINE = 24, 40, 180
-"""returns of each map that judge candidates, that refine the distinct ones, and that refine the finalists"""
+FEW, COARSE, MIDDLE, FINE = 30, 120, 90, 360
+"""returns of each map that judge candidates where there are very many, that judge them, that refine the distinct
+ones, and that judge those and refine the finalists"""
+MANY = 4000
+"""candidates; of more, as many are left after a look at a few returns"""
 APART = 0.15, math.radians(5.0)
 """metres and radians; nearer candidates are taken as one before refinement brings them together"""
 STEPS, FINAL_STEPS = 6, 4
@@ -28,6 +34,28 @@ LAST_GATE = 0.1
 FINAL_GATE = 0.15
 """metres; the gate the finalists begin with"""
 FINALISTS = 12
+"""distinct poses that verified mode ranks in the end"""
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """Two maps as their sensors saw them."""
+
+    seen_1: Sighting
+    seen_2: Sighting
+    fields: tuple[Field, Field]
+
+    def points(self, most: int) -> tuple[FloatArray, FloatArray]:
+        """At most about so many returns of each map."""
+        return thinned(self.seen_1, most).points, thinned(self.seen_2, most).points
+
+
+def views(map_1: SegmentMap, map_2: SegmentMap, parameters: Parameters) -> Views | None:
+    """Two maps as their sensors saw them; None where one knows of no scan."""
+    seen_1, seen_2 = sighting(map_1), sighting(map_2)
+    if seen_1 is None or seen_2 is None:
+        return None
+    return Views(seen_1, seen_2, (field(seen_1, parameters), field(seen_2, parameters)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,24 +95,29 @@ class Verified:
         return both.best(parameters)
 
 
-def verify(seen_1: Sighting, seen_2: Sighting, poses: FloatArray, parameters: Parameters) -> Verified:
+def verify(seen: Views, poses: FloatArray, parameters: Parameters) -> Verified:
     """Judge, refine and judge again candidates ``T_1_2`` of poses (k, 3); the distinct best of them."""
-    rows = _promising(seen_1, seen_2, poses, parameters)
-    middle_1, middle_2 = thinned(seen_1, MIDDLE), thinned(seen_2, MIDDLE)
-    moved = refined(middle_1, middle_2, poses[rows], STEPS, parameters.refine_gate, LAST_GATE)
-    fine_1, fine_2 = thinned(seen_1, FINE), thinned(seen_2, FINE)
-    order = np.argsort(-score(look(fine_1, fine_2, moved, parameters), parameters), kind="stable")
-    kept = _distinct(moved, order, parameters, FINALISTS)
-    final = refined(fine_1, fine_2, moved[kept], FINAL_STEPS, FINAL_GATE, LAST_GATE)
-    totals = look(seen_1, seen_2, final, parameters)
+    rows = _promising(seen, poses, parameters)
+    middle, fine = seen.points(MIDDLE), seen.points(FINE)
+    moved = refined(*seen.fields, *middle, poses[rows], STEPS, parameters.refine_gate, LAST_GATE)
+    kept = _distinct(moved, _order(seen, fine, moved, parameters), parameters, FINALISTS)
+    final = refined(*seen.fields, *fine, moved[kept], FINAL_STEPS, FINAL_GATE, LAST_GATE)
+    totals = look(seen.seen_1, seen.seen_2, final, parameters)
     return Verified(rows[kept], final, totals, score(totals, parameters)).best(parameters)
 
 
-def _promising(seen_1: Sighting, seen_2: Sighting, poses: FloatArray, parameters: Parameters) -> IntArray:
-    """The distinct ones among the best candidates, judged by a few returns each."""
-    few_1, few_2 = thinned(seen_1, COARSE), thinned(seen_2, COARSE)
-    order = np.argsort(-score(look(few_1, few_2, poses, parameters), parameters), kind="stable")
+def _promising(seen: Views, poses: FloatArray, parameters: Parameters) -> IntArray:
+    """The distinct ones among the best candidates, judged by some returns each."""
+    rows = np.arange(len(poses))
+    if len(poses) > MANY:
+        rows = np.sort(_order(seen, seen.points(FEW), poses, parameters)[:MANY])
+    order = rows[_order(seen, seen.points(COARSE), poses[rows], parameters)]
     return distinct(poses, order, *APART, parameters.refined_candidates)
+
+
+def _order(seen: Views, points: tuple[FloatArray, FloatArray], poses: FloatArray, parameters: Parameters) -> IntArray:
+    """Rows of poses (k, 3) by what some returns say of them, best first; ties go to the first."""
+    return np.argsort(-score(look_up(*seen.fields, *points, poses), parameters), kind="stable")
 
 
 def _distinct(poses: FloatArray, order: IntArray, parameters: Parameters, most: int) -> IntArray:

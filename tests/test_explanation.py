@@ -13,7 +13,7 @@ from worlds import maps, poses
 from segmap.chains import matching_chains
 from segmap.evaluation import evaluate
 from segmap.explanation import Explanation, explain
-from segmap.integration import match_maps
+from segmap.integration import integrate, match_maps
 from segmap.parameters import Parameters, preset
 from segmap.pose import Pose2
 from segmap.segments import SegmentMap
@@ -152,6 +152,19 @@ def test_every_return_is_there_once_and_says_what_is_seen(in_the_room):
                 assert abs(along[0] * (one.y - y1) - along[1] * (one.x - x1)) < 0.1
         on_walls = sum(one.width for one in side.returns if one.segment is not None)
         assert on_walls > 0.8 * sum(one.width for one in side.returns)
+
+
+def test_returns_of_a_fused_map_sum_to_the_score(in_the_room):
+    """Of several scans each place counts once and no more is unseen than of one: by return, by segment, in sum."""
+    map_1, map_2, truth = in_the_room
+    fused = integrate(map_1, map_2, P, mode="verified").map
+    for T_1_2 in (truth, Pose2(truth.x + 0.5, truth.y, truth.theta), Pose2(40.0, 0.0, 0.0)):
+        found = explain(fused, map_2, T_1_2, P)
+        for terms in told(found):
+            assert math.fsum(term.score for term in terms) == pytest.approx(found.score, abs=1e-9)
+        for name in CLASS_NAMES:
+            metres = math.fsum(term.width for side in found.sights for term in side.returns if term.seen == name)
+            assert metres == pytest.approx(getattr(found.evidence, name), abs=1e-9)
 
 
 def test_what_speaks_against_a_pose_is_found_where_it_is(in_the_room):

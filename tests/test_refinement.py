@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulated import DEGREE, alone, exact, read_backwards
 
-from segmap._sight_kernels import normal_equations
+from segmap._sight_kernels import nearest_segments, normal_equations
 from segmap.parameters import Parameters
 from segmap.pose import Pose2, wrap
 from segmap.refinement import distinct, information, refined, uncertainty
@@ -237,6 +237,35 @@ def test_covariance_is_one():
         assert axes == pytest.approx((found.strongest, found.weakest))
 
 
+def test_poses_are_held_each_by_itself():
+    """Many poses at once or one by one, and by the plain reading of nearest segments: the same."""
+    map_1, map_2, T_1_2 = simulated.pair(simulated.room(), HERE, THERE, seed=4)
+    seen = sighting(map_1), sighting(map_2)
+    poses = perturbed(T_1_2, 5, seed=6)
+    together = information(map_1, map_2, *seen, poses, Parameters())
+    for pose, matrix in zip(poses, together, strict=True):
+        alone = information(map_1, map_2, *seen, pose[None], Parameters())[0]
+        assert matrix == pytest.approx(alone)
+        assert matrix == pytest.approx(plainly_held(map_1, map_2, seen, Pose2(*pose)), rel=1e-6)
+
+
+def plainly_held(map_1, map_2, seen, T_1_2):
+    """The same by looking at every point and every segment, in frame 1."""
+    total = np.zeros((3, 3))
+    for points, walls in ((T_1_2 @ seen[1].points[:, :2], map_1), (seen[0].points[:, :2], map_2.moved(T_1_2))):
+        nearest, distances = nearest_segments(points, walls.coordinates)
+        for point, i, distance in zip(points, nearest, distances, strict=True):
+            x1, y1, x2, y2 = walls.coordinates[i]
+            length = math.dist((x1, y1), (x2, y2))
+            along, arm = np.array((x2 - x1, y2 - y1)) / length, point - (T_1_2.x, T_1_2.y)
+            weight = max(0.0, 1.0 - (distance / 0.1) ** 2) ** 2
+            for direction, share in (((-along[1], along[0]), 1.0), (along, -(min(1.0, 0.03 / length) ** 2))):
+                slope = np.array((*direction, direction[1] * arm[0] - direction[0] * arm[1]))
+                total += weight * share * np.outer(slope, slope)
+    strengths, axes = np.linalg.eigh(total)
+    return (axes * np.maximum(strengths, 0.0)) @ axes.T
+
+
 def test_without_walls_nothing_is_held():
     """No segments, or none near any return: as uncertain as the gate, and no crash."""
     map_1, map_2, T_1_2 = simulated.pair(simulated.room(), HERE, THERE)
@@ -244,7 +273,7 @@ def test_without_walls_nothing_is_held():
     apart = Pose2(50.0, 0.0, 0.0)
     seen = sighting(map_1)
     for one, other, T in ((bare, bare, T_1_2), (map_1, map_2, apart)):
-        assert not information(one, other, seen, seen, T, Parameters()).any()
+        assert not information(one, other, seen, seen, np.array([tuple(T)]), Parameters()).any()
         assert held(one, other, T).weakest == pytest.approx(Parameters().refine_gate)
 
 

@@ -146,3 +146,48 @@ def normal_equations(scan_1, scan_2, points_1, points_2, pose, gate):
                 residuals.append(normal @ place - offset)
     jacobian, weighted = np.array(rows), np.array(rows) * np.array(weights)[:, None]
     return weighted.T @ jacobian, -weighted.T @ np.array(residuals)
+
+
+# --- refinement in fields -------------------------------------------------------------------------
+
+
+def pieces(scan):
+    """The surface between neighbouring beams' returns, by beam: (from, to, normal, offset)."""
+    found = []
+    for k in range(len(scan)):
+        left = (k + 1) % len(scan)
+        if left == 0 and not scan.all_round:
+            continue
+        a, b = returned(scan, k), returned(scan, left)
+        if a is not None and b is not None and 0.0 < math.dist(a, b) < GAP:
+            found.append((a, b, *line_through(scan, k, left)))
+    return found
+
+
+def normal_equations_in_fields(ways, pose, gate):
+    """J^T W J, -J^T W r and the sum of W at a pose ``T_1_2``.
+
+    Of each way: a scan, its field, the other one's points, 1 where the pose moves them and -1 where its inverse does.
+    """
+    rows, weights, residuals = [], [], []
+    for scan, field, points, way in ways:
+        surface = pieces(scan)
+
+        def moved(p, points=points[:, :2], way=way):
+            return (Pose2(*p) if way > 0 else Pose2(*p).inverse()) @ points
+
+        places = moved(pose)
+        slopes = np.stack([(moved(pose + h) - moved(pose - h)) / 2e-6 for h in 1e-6 * np.eye(3)], axis=-1)
+        for place, slope in zip(places, slopes, strict=True):
+            column, row = np.floor((place - field.frame[:2]) * field.frame[2]).astype(int)
+            inside = 0 <= row < field.nearest.shape[0] and 0 <= column < field.nearest.shape[1]
+            if not inside or field.nearest[row, column] < 0:
+                continue
+            a, b, normal, offset = surface[field.nearest[row, column]]
+            distance, share = to_piece(place, a, b)
+            if distance < gate and -0.5 <= share <= 1.5:
+                rows.append(normal @ slope)
+                weights.append((1.0 - (distance / gate) ** 2) ** 2)
+                residuals.append(normal @ place - offset)
+    jacobian, weighted = np.array(rows), np.array(rows) * np.array(weights)[:, None]
+    return weighted.T @ jacobian, -weighted.T @ np.array(residuals), sum(weights)
