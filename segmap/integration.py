@@ -7,20 +7,20 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydantic import TypeAdapter
 
 from segmap.candidates import HEURISTICS, PAPER_HEURISTICS, Candidates, candidates
-from segmap.chains import MatchingChain, matching_chains
+from segmap.chains import matching_chains
 from segmap.errors import ParameterError
 from segmap.evaluation import best, evaluate, matching_values
 from segmap.fusion import Fusion, fuse
+from segmap.matches import Candidate, Match
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
-from segmap.refinement import Uncertainty, uncertainties
+from segmap.refinement import uncertainties
 from segmap.segments import SegmentMap
 from segmap.verdict import Findings, Verdict, confidence, findings, judge
 from segmap.verification import Verified, Views, verify, views
-from segmap.visibility import Evidence, evidence
+from segmap.visibility import evidence
 
 __all__ = [
     "AUTOMATIC",
@@ -67,92 +67,6 @@ def chosen_heuristic(mode: str, name: str | None = None) -> str:
         known = ", ".join(heuristics(mode))
         raise ParameterError(f"There is no heuristic {name[:80]!r} in {mode} mode. Heuristics are: {known}.")
     return name or DEFAULT_HEURISTIC[mode]
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """One candidate transformation and its value."""
-
-    T_1_2: Pose2
-    value: float
-    """metres (III-B)"""
-    angle_1: tuple[int, int]
-    """the segments of map 1 whose angle it superimposes"""
-    angle_2: tuple[int, int]
-    """those of map 2"""
-    index: int
-    """place among the candidates in the order they were found, from 0"""
-    score: float | None = None
-    """verified: support less conflict, metres"""
-    evidence: Evidence | None = None
-    """verified: what lines of sight say"""
-    uncertainty: Uncertainty | None = None
-    """verified: how well the geometry holds the pose"""
-
-
-@dataclass(frozen=True)
-class Match:
-    """What the first two steps of INTEGRATE found: the ranked candidates, and a verdict on the best."""
-
-    mode: str
-    heuristic: str
-    segments: tuple[int, int]
-    """number of segments of map 1 and map 2"""
-    ranked: tuple[Candidate, ...]
-    """the best candidates, best first; ties go to the one found first"""
-    candidates: int
-    """poses evaluated"""
-    discarded: int
-    """of them, discarded because long segments cross"""
-    draws: int | None
-    """draws of the heuristic ``random``"""
-    chains: tuple[MatchingChain, ...]
-    """matching chains at the best candidate"""
-    verdict: Verdict
-    reasons: tuple[str, ...]
-    """the verdict in words"""
-    milliseconds: float
-    confidence: float | None = None
-    """verified: calibrated probability that the best candidate is right"""
-
-    @property
-    def best(self) -> Candidate | None:
-        """The best candidate; None where no transformation has a value."""
-        return self.ranked[0] if self.ranked else None
-
-    @property
-    def T_1_2(self) -> Pose2 | None:
-        """Pose of map 2 in the frame of map 1; None where there is none."""
-        return self.ranked[0].T_1_2 if self.ranked else None
-
-    @property
-    def value(self) -> float:
-        """Value of the best candidate, metres; 0 where there is none."""
-        return self.ranked[0].value if self.ranked else 0.0
-
-    @property
-    def score(self) -> float:
-        """What matches of one mode are ranked by: the confidence, or in paper mode the value in metres."""
-        return self.value if self.confidence is None else self.confidence
-
-    def judged(self, parameters: Parameters) -> Match:
-        """The same match, with its verdict by other thresholds; nothing is searched again."""
-        if not self.ranked:
-            return self
-        verdict, reasons = _judgement(self.ranked, parameters)
-        return replace(self, verdict=verdict, reasons=reasons)
-
-    def to_json(self) -> str:
-        """This match as one JSON document."""
-        return _ADAPTER.dump_json(self).decode()
-
-    @classmethod
-    def from_json(cls, text: str | bytes) -> Match:
-        """The match that :meth:`to_json` wrote."""
-        return _ADAPTER.validate_json(text)
-
-
-_ADAPTER = TypeAdapter(Match)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,6 +125,7 @@ def match_maps(
     started = time.perf_counter()
     found = _verified(task) if mode == "verified" else _as_the_paper(task)
     verdict, reasons = _verdict(found, task)
+    known = _findings(found.ranked)
     return Match(
         mode=mode,
         heuristic=task.heuristic,
@@ -223,7 +138,8 @@ def match_maps(
         verdict=verdict,
         reasons=reasons,
         milliseconds=1000.0 * (time.perf_counter() - started),
-        confidence=_confidence(found.ranked) if mode == "verified" else None,
+        confidence=_confidence(known) if mode == "verified" else None,
+        findings=known,
     )
 
 
@@ -371,12 +287,11 @@ def _findings(ranked: tuple[Candidate, ...]) -> Findings | None:
 
 def findings_of(match: Match) -> Findings | None:
     """What speaks for and against the best candidate of a match; None without evidence."""
-    return _findings(match.ranked)
+    return match.findings
 
 
-def _confidence(ranked: tuple[Candidate, ...]) -> float:
-    found = _findings(ranked)
-    return 0.0 if found is None else confidence(found)
+def _confidence(known: Findings | None) -> float:
+    return 0.0 if known is None else confidence(known)
 
 
 def _why_none(found: _Found, task: _Task) -> str:

@@ -32,6 +32,7 @@ ORDER = (
     "verification",
     "verdict",
     "chains",
+    "matches",
     "explanation",
     "fusion",
     "integration",
