@@ -12,7 +12,7 @@ from app.inputs import facts_of, remember
 from app.modes import NEW_PROJECTS as MODE
 from segmap.errors import LogError
 from segmap.integration import DEFAULT_HEURISTIC, DEFAULT_PRESET, chosen_heuristic
-from segmap.logs import base_name, read_log
+from segmap.logs import ROS_2_BAG, Limits, base_name, read_logs
 from segmap.parameters import preset
 from segmap.project import ProjectState
 from segmap.scans import LaserLog
@@ -21,6 +21,8 @@ from segmap.store import Store
 __all__ = ["Filled", "Source", "copy_project", "fill", "is_project"]
 
 SQLITE = b"SQLite format 3\0"
+START = 1 << 16
+"""bytes to tell what a file is by"""
 
 
 @dataclass(frozen=True)
@@ -40,38 +42,39 @@ class Filled:
 
 
 def is_project(file: BinaryIO) -> bool:
-    """Whether a file is a database, as projects are; found by content, not by name."""
-    start = file.read(len(SQLITE))
+    """Whether a file is a database, as projects are, and no bag; found by content, not by name."""
+    start = file.read(START)
     file.seek(0)
-    return start == SQLITE
+    return start.startswith(SQLITE) and not ROS_2_BAG.recognises(start)
 
 
-def fill(path: Path, title: str, sources: Sequence[Source]) -> Filled:
-    """A new project file at ``path`` with all logs that can be read.
+def fill(path: Path, title: str, sources: Sequence[Source], limits: Limits | None = None) -> Filled:
+    """A new project file at ``path`` with all logs that can be read; a bag gives a log for each laser topic.
 
     Raises:
         LogError: none can be.
     """
-    logs, failures = _read(sources)
+    logs, failures = _read(sources, limits)
     if not logs:
         raise LogError(" ".join(failures))
     filled = Filled(problems=tuple(failures))
     with Store.create(path, title, preset(DEFAULT_PRESET[MODE]), DEFAULT_HEURISTIC[MODE], MODE) as store:
         for source, log in logs:
             source.file.seek(0)
-            info = store.add_log(log.name, source.file, scans=len(log), format=log.format)
-            remember(store, info.sha256, facts_of(log))
+            info = store.add_log(log.name, source.file, scans=len(log), format=log.format, topic=log.topic)
+            remember(store, info, facts_of(log))
             filled.logs[info.index] = log
             filled.problems += tuple(f"{log.name}, {problem}" for problem in log.problems)
     return filled
 
 
-def _read(sources: Sequence[Source]) -> tuple[list[tuple[Source, LaserLog]], list[str]]:
-    logs, failures = [], []
+def _read(sources: Sequence[Source], limits: Limits | None) -> tuple[list[tuple[Source, LaserLog]], list[str]]:
+    logs: list[tuple[Source, LaserLog]] = []
+    failures = []
     for source in sources:
         source.file.seek(0)
         try:
-            logs.append((source, read_log(source.file, base_name(source.name))))
+            logs += [(source, log) for log in read_logs(source.file, base_name(source.name), limits)]
         except LogError as error:
             failures.append(str(error))
     return logs, failures

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from app.errors import UnknownError
 from app.matching import ResultStore
-from segmap.logs import read_log
+from segmap.logs import Limits, read_log
 from segmap.parameters import Parameters
 from segmap.project import LogInfo
 from segmap.scans import LaserLog, LaserScan, ScanId
@@ -18,6 +18,8 @@ from segmap.segments import SegmentMap, extract
 
 __all__ = ["EXTRACTION", "Facts", "Inputs", "facts_of", "remember"]
 
+EXPANDS = 16
+"""bytes of a log for each byte of its file, at the most; compressed laser logs have 3 to 10"""
 EXTRACTION = ("max_range", "cluster_distance", "split_tolerance", "min_segment_length")
 """the parameters a scan's segments depend on"""
 
@@ -36,9 +38,13 @@ def facts_of(log: LaserLog) -> Facts:
     return Facts(log.no_return, tuple(str(problem) for problem in log.problems))
 
 
-def remember(results: ResultStore, sha256: str, facts: Facts) -> None:
+def remember(results: ResultStore, info: LogInfo, facts: Facts) -> None:
     """Keep the facts of a log in its project, so that showing them takes no reading."""
-    results.put_result(f"log/{sha256}", json.dumps([facts.no_return, facts.problems]))
+    results.put_result(_key(info), json.dumps([facts.no_return, facts.problems]))
+
+
+def _key(info: LogInfo) -> str:
+    return f"log/{info.sha256}{info.topic}"
 
 
 class Inputs:
@@ -74,13 +80,15 @@ class Inputs:
         with self._reading:
             if index not in self._logs:
                 info = self._infos[index]
-                self._logs[index] = read_log(self._bytes(index), info.name)
-                remember(self._results, info.sha256, facts_of(self._logs[index]))
+                limits = Limits(size=max(Limits().size, EXPANDS * info.size))  # it was read before, whatever its size
+                log = read_log(self._bytes(index), info.name, limits, info.topic or None)
+                self._logs[index] = replace(log, name=info.name)
+                remember(self._results, info, facts_of(log))
             return self._logs[index]
 
     def facts(self, index: int) -> Facts:
         """What is known of a log; it is read only if nobody has ever read it in this project."""
-        held = self._results.get_result(f"log/{self._infos[index].sha256}")
+        held = self._results.get_result(_key(self._infos[index]))
         if held is None:
             return facts_of(self.log(index))
         no_return, problems = json.loads(held)

@@ -20,7 +20,7 @@ from app.jobs import WarmUp
 from app.samples import Samples
 from app.session import PICTURE, Session
 from segmap.errors import SegmapError
-from segmap.logs import base_name
+from segmap.logs import ANY_SIZE, Limits, base_name
 from segmap.project import ProjectState
 from segmap.scans import LaserLog
 from segmap.store import Store
@@ -153,7 +153,7 @@ class Workspace:
 
     # --- making -----------------------------------------------------------------------------------
 
-    def create(self, sources: Sequence[Source]) -> Created:
+    def create(self, sources: Sequence[Source], limits: Limits | None = None) -> Created:
         """A project of some logs, or of one project file, which is checked and copied.
 
         A file that cannot be read is left out and told of, as long as one can be read.
@@ -166,7 +166,7 @@ class Workspace:
         projects = [source for source in sources if is_project(source.file)]
         if projects and len(sources) > 1:
             raise RequestError(f"{base_name(projects[0].name)} is a project: open it alone, without other files.")
-        return self._take_in(projects[0]) if projects else self._make(_title(sources), sources)
+        return self._take_in(projects[0]) if projects else self._make(_title(sources), sources, limits)
 
     def create_sample(self, name: str) -> Created:
         """A project of a sample. Raises UnknownError where there is no such sample."""
@@ -189,7 +189,7 @@ class Workspace:
         if found is not None:
             return found
         with _opened(paths) as sources:
-            return self.create(sources).id
+            return self.create(sources, ANY_SIZE).id
 
     def _adopt(self, path: Path) -> str:
         path = path.resolve()
@@ -203,13 +203,13 @@ class Workspace:
     def _made_of(self, digests: list[str]) -> str | None:
         """The project changed last that has exactly these logs."""
         for summary in self.summaries():
-            if summary.state is not None and [log.sha256 for log in summary.state.logs] == digests:
+            if summary.state is not None and _files(summary.state) == digests:
                 return summary.id
         return None
 
-    def _make(self, title: str, sources: Sequence[Source]) -> Created:
+    def _make(self, title: str, sources: Sequence[Source], limits: Limits | None = None) -> Created:
         with self._new_file(title) as (id, path):
-            filled = fill(path, title, sources)
+            filled = fill(path, title, sources, limits)
         self._known_logs = {id: filled.logs}  # of the last one only: it is the one opened next
         return Created(id, title, filled.problems)
 
@@ -264,6 +264,11 @@ def _title(sources: Sequence[Source]) -> str:
     names = [re.sub(r"(\.gz)?$", "", base_name(source.name), flags=re.IGNORECASE) for source in sources]
     stems = [name.rpartition(".")[0] or name for name in names]
     return stems[0] if len(stems) == 1 else f"{stems[0]} and {len(stems) - 1} more"
+
+
+def _files(state: ProjectState) -> list[str]:
+    """The files the logs of a project came from, by digest; a bag of several topics is one file."""
+    return list(dict.fromkeys(log.sha256 for log in state.logs))
 
 
 def _slug(title: str) -> str:

@@ -135,6 +135,8 @@ class LogInfo(_Model):
     scans: int = Field(ge=0)
     format: _Name = ""
     """for people: ``CARMEN``, ..."""
+    topic: _Name = ""
+    """of a recording of several topics, the one its scans were published on"""
     index: int = Field(default=0, ge=0)
     """its place among the project's logs, from 0: the ``log`` of a ScanId; given when it is added"""
     event: int = Field(default=0, ge=0)

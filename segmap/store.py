@@ -169,16 +169,18 @@ class Store:
 
     # logs
 
-    def add_log(self, name: str, content: bytes | BinaryIO, *, scans: int, format: str = "", who: str = "") -> LogInfo:
+    def add_log(
+        self, name: str, content: bytes | BinaryIO, *, scans: int, format: str = "", topic: str = "", who: str = ""
+    ) -> LogInfo:
         """Put a log into the project, byte for byte; a file is read to its end, chunk by chunk.
 
-        ``scans`` and ``format`` are what reading it found. Either all of the log is kept or nothing.
+        ``scans``, ``format`` and ``topic`` are what reading it found. Either all of the log is kept or nothing.
         """
         file = io.BytesIO(content) if isinstance(content, bytes) else content
         with self._recording() as state:
             seq = state.revision + 1
             sha256, size = self._insert_chunks(seq, _pieces(name, file))
-            info = LogInfo(name=name, sha256=sha256, size=size, scans=scans, format=format)
+            info = LogInfo(name=name, sha256=sha256, size=size, scans=scans, format=format, topic=topic)
             insert_event(self._connection, seq, _stamped(AddLog(log=info, who=who), seq, None).model_dump_json())
         return self._state.logs[len(state.logs)]
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import asdict
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from app.cli.options import Json, Log, Preset, Setting, parameters_of, read
+from app.cli.options import Json, Log, Preset, Setting, open_log, parameters_of, read
 from app.cli.output import print_facts, print_json, print_table
-from segmap.logs import read_log
 from segmap.scans import LaserLog, LaserScan
 from segmap.segments import extract
 
@@ -20,7 +20,7 @@ __all__ = ["info", "segments"]
 
 def info(log: Log, as_json: Json = False) -> None:
     """Say what is in a log: its format, its scans, its laser, and what could not be read."""
-    facts = _facts(read_log(log))
+    facts = _facts(open_log(log))
     if as_json:
         print_json(facts)
         return
@@ -32,6 +32,7 @@ def info(log: Log, as_json: Json = False) -> None:
         {
             "log": facts["log"],
             "format": facts["format"] or "none",
+            **({"topic": facts["topic"]} if facts["topic"] else {}),
             "scans": facts["scans"],
             "laser": lasers or "none",
             "no return": "none found" if facts["no_return"] is None else f"{facts['no_return']:g} m",
@@ -41,7 +42,7 @@ def info(log: Log, as_json: Json = False) -> None:
         }
     )
     for problem in facts["problems"]:
-        typer.echo(f"  line {problem['line']}: {problem['reason']}")
+        typer.echo(f"  {problem['unit']} {problem['line']}: {problem['reason']}")
 
 
 def _facts(log: LaserLog) -> dict[str, Any]:
@@ -50,12 +51,13 @@ def _facts(log: LaserLog) -> dict[str, Any]:
     return {
         "log": log.name,
         "format": log.format,
+        "topic": log.topic,
         "scans": len(log),
         "lasers": [{**dict(laser), "scans": count} for laser, count in Counter(map(_laser, log)).most_common()],
         "no_return": log.no_return,
         "returns": seen / beams if beams else 0.0,
         "logged_poses": sum(scan.logged_pose is not None for scan in log),
-        "problems": [{"line": problem.line, "reason": problem.reason} for problem in log.problems],
+        "problems": [asdict(problem) for problem in log.problems],
     }
 
 

@@ -20,7 +20,8 @@ from app.cli.options import (
     Setting,
     method_of,
     one_of,
-    read,
+    read_all,
+    topic_of,
 )
 from app.cli.output import pose_json, print_json, print_table, progress
 from app.cli.writing import described, listed, new_project, times_of, write_trajectory
@@ -71,7 +72,8 @@ def merge(
     """
     by = method_of(mode, heuristic, preset, settings)
     _check_places(out or [], project)
-    laser_logs = [read(path) for path in logs]
+    sources = [(topic_of(path)[0], log) for path in logs for log in read_all(path)]
+    laser_logs = [log for _, log in sources]
     merged = _merged(laser_logs, by, method)
     content = Content(merged.components, merged.about, list(map(str, merged.accepted)), times_of(laser_logs))
     for path in out or []:
@@ -79,7 +81,6 @@ def merge(
     if trajectory is not None:
         write_trajectory(trajectory, merged.components, laser_logs)
     if project is not None:
-        sources = list(zip(logs, laser_logs, strict=True))
         new_project(project, merged.title, sources, by, merged.accepted)
     _report(merged, as_json)
 

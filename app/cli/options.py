@@ -11,7 +11,7 @@ import typer
 
 from segmap.errors import ParameterError
 from segmap.integration import DEFAULT_HEURISTIC, DEFAULT_PRESET, MODES, chosen_heuristic, heuristics
-from segmap.logs import read_log
+from segmap.logs import ANY_SIZE, read_log, read_logs
 from segmap.parameters import PRESETS, Parameters, preset
 from segmap.scans import LaserLog
 
@@ -27,8 +27,11 @@ __all__ = [
     "Setting",
     "method_of",
     "one_of",
+    "open_log",
     "parameters_of",
     "read",
+    "read_all",
+    "topic_of",
 ]
 
 
@@ -52,7 +55,7 @@ def _by_mode(defaults: Mapping[str, str]) -> str:
 
 
 Log: TypeAlias = Annotated[
-    Path, typer.Argument(metavar="LOG", help="A laser log, plain or gzipped.", show_default=False)
+    Path, typer.Argument(metavar="LOG", help="A laser log, plain or gzipped; of a bag, FILE#TOPIC.", show_default=False)
 ]
 Json: TypeAlias = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 Explain: TypeAlias = Annotated[
@@ -116,7 +119,33 @@ def _assignment(text: str) -> tuple[str, str]:
 
 def read(path: Path) -> LaserLog:
     """A log; what could not be read of it is said on standard error."""
-    log = read_log(path)
+    return _told(open_log(path))
+
+
+def read_all(path: Path) -> list[LaserLog]:
+    """All logs of a file, one for each laser topic of a bag, unless the path names a topic."""
+    if topic_of(path)[1] is not None:
+        return [read(path)]
+    return [_told(log) for log in read_logs(path, limits=ANY_SIZE)]
+
+
+def open_log(path: Path) -> LaserLog:
+    """A log of any size, as it is; ``FILE#TOPIC`` is that topic of a bag."""
+    file, topic = topic_of(path)
+    return read_log(file, limits=ANY_SIZE, topic=topic)
+
+
+def topic_of(path: Path) -> tuple[Path, str | None]:
+    """The file and the topic that ``FILE#TOPIC`` names; a path that exists names no topic.
+
+    >>> topic_of(Path("run.bag#/front/scan"))[1]
+    '/front/scan'
+    """
+    file, mark, topic = path.as_posix().partition("#")
+    return (path, None) if not mark or path.exists() else (Path(file), topic)
+
+
+def _told(log: LaserLog) -> LaserLog:
     for problem in log.problems:
         typer.echo(f"segmap: {log.name}: {problem}", err=True)
     return log

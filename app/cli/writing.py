@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from io import BufferedReader
 from pathlib import Path
 
 import typer
@@ -57,19 +58,20 @@ def new_project(
 ) -> None:
     """A project of some logs in which these integrations are accepted, and everything else is for a person."""
     with Store.create(path, name, by.parameters, by.heuristic, by.mode, who=COMMAND) as store:
-        for file, log in logs:
-            info = store.add_log(log.name, _content(file), scans=len(log), format=log.format, who=COMMAND)
-            remember(store, info.sha256, facts_of(log))
+        for path, log in logs:
+            with _opened(path) as file:
+                info = store.add_log(log.name, file, scans=len(log), format=log.format, topic=log.topic, who=COMMAND)
+            remember(store, info, facts_of(log))
         choices = tuple(_choice(integration, match, by.parameters) for integration, match in accepted.items())
         if choices:
             store.append(Decide(choices=choices, who=COMMAND, reason="accepted without asking"))
 
 
-def _content(file: Path) -> bytes:
+def _opened(path: Path) -> BufferedReader:
     try:
-        return file.read_bytes()
+        return path.open("rb")
     except OSError as error:
-        raise LogError(f"{file} cannot be read: {(error.strerror or str(error)).lower()}.") from None
+        raise LogError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}.") from None
 
 
 def _choice(integration: IntegrationId, match: Match, parameters: Parameters) -> Choice:

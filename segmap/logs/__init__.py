@@ -19,15 +19,16 @@ from segmap.logs.no_return import LONGEST, SHORTEST, NoReturn, no_return
 from segmap.logs.records import Format, Problems, Record
 from segmap.logs.rosbag1 import ROS_1_BAG
 from segmap.logs.rosbag2 import ROS_2_BAG
-from segmap.logs.source import Limits, LogFile, LogSource, base_name, name_of
+from segmap.logs.source import ANY_SIZE, Limits, LogFile, LogSource, base_name, name_of
 from segmap.logs.text import printable, shown
 from segmap.scans import LaserLog, LaserScan
 
-__all__ = ["FORMATS", "Limits", "LogSource", "base_name", "read_log", "read_logs", "recognised"]
+__all__ = ["ANY_SIZE", "FORMATS", "ROS_2_BAG", "Limits", "LogSource", "base_name", "read_log", "read_logs"]
 
-FORMATS: tuple[Format, ...] = (CARMEN, DP_SLAM, ROS_1_BAG, ROS_2_BAG, MCAP)
-"""Every format read; the first that recognises a file reads it."""
+FORMATS: tuple[Format, ...] = (ROS_1_BAG, ROS_2_BAG, MCAP, CARMEN, DP_SLAM)
+"""Every format read; the first that recognises a file reads it, and those with a mark of their own come first."""
 
+SQLITE = b"SQLite format 3\0"
 FAR = 100.0
 """metres; a log most of whose readings are farther is not in metres"""
 PACKED = {
@@ -113,11 +114,6 @@ def _log(name: str, format: Format, records: Sequence[Record], problems: Problem
     return LaserLog(name, scans, format.name, _main(records, silence), problems.all(), topic)
 
 
-def recognised(head: bytes) -> str | None:
-    """The name of the format that the first bytes of a file, decompressed, belong to; None: of no known one."""
-    return next((format.name for format in FORMATS if format.recognises(head)), None)
-
-
 def _empty(file: LogFile, problems: Problems) -> LaserLog:
     if file.damage:
         raise LogError(f"{file.name} is {file.damage} from its beginning: fetch the file again.")
@@ -126,9 +122,11 @@ def _empty(file: LogFile, problems: Problems) -> LaserLog:
 
 
 def _format_of(head: bytes, file: LogFile) -> Format:
-    for format in FORMATS:
-        if format.recognises(head):
-            return format
+    format = next((format for format in FORMATS if format.recognises(head)), None)
+    if head.startswith(SQLITE) and format is not ROS_2_BAG:
+        raise LogError(f"{file.name} is a database, but no ROS 2 bag: a project is opened alone, with segmap serve.")
+    if format is not None:
+        return format
     for magic, packed in PACKED.items():
         if head.startswith(magic):
             raise LogError(f"{file.name} is {packed}: unpack it and give the log inside.")

@@ -20,7 +20,7 @@ from typing import IO, Any, TypeAlias
 
 from segmap.errors import LogError
 
-__all__ = ["Limits", "LogFile", "LogSource", "base_name", "name_of"]
+__all__ = ["ANY_SIZE", "Limits", "LogFile", "LogSource", "base_name", "name_of"]
 
 LogSource: TypeAlias = str | os.PathLike[str] | bytes | bytearray | memoryview | IO[bytes]
 """A path, the bytes themselves, or a binary stream (read from where it stands, and not closed)."""
@@ -47,6 +47,10 @@ class Limits:
     """bytes of one line"""
     lines: int = 10_000_000
     scans: int = 500_000
+
+
+ANY_SIZE = Limits(size=1 << 50, lines=1 << 40)
+"""for files of one's own; what grows beyond measure when decompressed is refused all the same"""
 
 
 def base_name(name: str) -> str:
