@@ -16,6 +16,8 @@ from segmap.logs.carmen import CARMEN
 from segmap.logs.dpslam import DP_SLAM
 from segmap.logs.mcap import MCAP
 from segmap.logs.no_return import LONGEST, SHORTEST, NoReturn, no_return
+from segmap.logs.ranges_csv import RANGES_CSV
+from segmap.logs.ranges_json import RANGES_JSON, RANGES_JSON_LINES
 from segmap.logs.records import Format, Problems, Record
 from segmap.logs.rosbag1 import ROS_1_BAG
 from segmap.logs.rosbag2 import ROS_2_BAG
@@ -25,7 +27,16 @@ from segmap.scans import LaserLog, LaserScan
 
 __all__ = ["ANY_SIZE", "FORMATS", "ROS_2_BAG", "Limits", "LogSource", "base_name", "read_log", "read_logs"]
 
-FORMATS: tuple[Format, ...] = (ROS_1_BAG, ROS_2_BAG, MCAP, CARMEN, DP_SLAM)
+FORMATS: tuple[Format, ...] = (
+    ROS_1_BAG,
+    ROS_2_BAG,
+    MCAP,
+    RANGES_CSV,
+    RANGES_JSON_LINES,
+    RANGES_JSON,
+    CARMEN,
+    DP_SLAM,
+)
 """Every format read; the first that recognises a file reads it, and those with a mark of their own come first."""
 
 SQLITE = b"SQLite format 3\0"
