@@ -21,11 +21,25 @@ from segmap.logs.ranges_json import RANGES_JSON, RANGES_JSON_LINES
 from segmap.logs.records import Format, Problems, Record
 from segmap.logs.rosbag1 import ROS_1_BAG
 from segmap.logs.rosbag2 import ROS_2_BAG
+from segmap.logs.segment_maps import MapPart, MapsFile, is_maps, read_maps
 from segmap.logs.source import ANY_SIZE, Limits, LogFile, LogSource, base_name, name_of
 from segmap.logs.text import printable, shown
 from segmap.scans import LaserLog, LaserScan
 
-__all__ = ["ANY_SIZE", "FORMATS", "ROS_2_BAG", "Limits", "LogSource", "base_name", "read_log", "read_logs"]
+__all__ = [
+    "ANY_SIZE",
+    "FORMATS",
+    "ROS_2_BAG",
+    "Limits",
+    "LogSource",
+    "MapPart",
+    "MapsFile",
+    "base_name",
+    "is_maps",
+    "read_log",
+    "read_logs",
+    "read_maps",
+]
 
 FORMATS: tuple[Format, ...] = (
     ROS_1_BAG,
@@ -138,6 +152,8 @@ def _format_of(head: bytes, file: LogFile) -> Format:
         raise LogError(f"{file.name} is a database, but no ROS 2 bag: a project is opened alone, with segmap serve.")
     if format is not None:
         return format
+    if is_maps(head):
+        raise LogError(f"{file.name} holds segment maps, not laser scans: give it where maps are asked for.")
     for magic, packed in PACKED.items():
         if head.startswith(magic):
             raise LogError(f"{file.name} is {packed}: unpack it and give the log inside.")

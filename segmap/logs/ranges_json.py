@@ -48,15 +48,15 @@ def parsed(text: bytes) -> Any:
         raise MalformedError(f"it is no JSON that can be read: {printable(str(error)).lower()}") from None
 
 
-def document(file: LogFile, remedy: str) -> Any:
+def document(file: LogFile, remedy: str, most: int = DOCUMENT) -> Any:
     """All of a file as one JSON document.
 
     Raises:
         LogError: it is none, or too large to be read at once; ``remedy`` says what to do then.
     """
-    content = file.read(DOCUMENT + 1)
-    if len(content) > DOCUMENT:
-        raise LogError(f"{file.name} is a JSON document of more than {DOCUMENT >> 20} MiB: {remedy}.")
+    content = file.read(most + 1)
+    if len(content) > most:
+        raise LogError(f"{file.name} is a JSON document of more than {most >> 20} MiB: {remedy}.")
     try:
         return parsed(content.removeprefix(b"\xef\xbb\xbf"))
     except MalformedError as error:
