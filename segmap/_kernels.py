@@ -14,7 +14,7 @@ from numba import njit
 
 from segmap.pose import FloatArray, IntArray
 
-__all__ = ["closest_edges", "covers", "equal_angles", "evaluate", "first_of_each", "matching_pairs", "superimpose"]
+__all__ = ["closest_edges", "covers", "directions", "equal_angles", "first_of_each", "superimpose"]
 
 TOUCH = 1e-9
 """metres; a segment whose extreme is this near to a line touches it, whatever the rounding"""
@@ -32,12 +32,21 @@ def _wrap(angle):  # type: ignore[no-untyped-def]
 
 
 @_compiled
-def _count_equal(phi_1, phi_2, tolerance):  # type: ignore[no-untyped-def]
-    count = 0
-    for a in range(len(phi_1)):
-        for b in range(len(phi_2)):
-            count += abs(_wrap(phi_1[a] - phi_2[b])) < tolerance
-    return count
+def _are_equal(phi, others, tolerance, equal):  # type: ignore[no-untyped-def]
+    """Note which of the others equal an angle; returns how many."""
+    for b in range(len(others)):
+        equal[b] = abs(_wrap(phi - others[b])) < tolerance
+    return equal.sum()
+
+
+@_compiled
+def _which(flags, rows):  # type: ignore[no-untyped-def]
+    """The indices of what is set, at the start of ``rows``, which has one place more than the flags."""
+    found = 0
+    for b in range(len(flags)):
+        rows[found] = b
+        found += flags[b]
+    return found
 
 
 @_compiled
@@ -55,18 +64,22 @@ def equal_angles(
     ``phi`` (n,), ``headings`` (n, 2) and ``vertices`` (n, 2) describe the angles of a map. Returns
     poses ``T_1_2`` (k, 3) and the two angles' indices, (k,) each.
     """
-    count = _count_equal(phi_1, phi_2, tolerance)
+    equal = np.empty(len(phi_2), np.uint8)
+    count = 0
+    for a in range(len(phi_1)):
+        count += _are_equal(phi_1[a], phi_2, tolerance, equal)
+    rows = np.empty(len(phi_2) + 1, np.int64)
     poses = np.empty((count, 3))
     angle_1 = np.empty(count, np.int64)
     angle_2 = np.empty(count, np.int64)
     k = 0
     for a in range(len(phi_1)):
-        for b in range(len(phi_2)):
-            if abs(_wrap(phi_1[a] - phi_2[b])) < tolerance:
-                _superimpose(headings_1[a], vertices_1[a], headings_2[b], vertices_2[b], poses[k])
-                angle_1[k] = a
-                angle_2[k] = b
-                k += 1
+        _are_equal(phi_1[a], phi_2, tolerance, equal)
+        for b in rows[: _which(equal, rows)]:
+            _superimpose(headings_1[a], vertices_1[a], headings_2[b], vertices_2[b], poses[k])
+            angle_1[k] = a
+            angle_2[k] = b
+            k += 1
     return poses, angle_1, angle_2
 
 
@@ -92,35 +105,47 @@ def _superimpose(headings_1, vertex_1, headings_2, vertex_2, pose):  # type: ign
     pose[2] = theta
 
 
-@_compiled
-def first_of_each(keys: IntArray, table: IntArray, filled: int) -> tuple[IntArray, int]:
-    """The rows of ``keys`` (k, 3) not seen before, first occurrences only.
+@_inlined
+def _mixed(key):  # type: ignore[no-untyped-def]
+    """One number of three, well mixed, not negative."""
+    mixed = key[0] * 0x1E3779B97F4A7C15 ^ key[1] * 0x42B2AE3D27D4EB4F ^ key[2] * 0x165667B19E3779F9
+    mixed = (mixed ^ (mixed >> 29)) * 0x3F58476D1CE4E5B9
+    return (mixed ^ (mixed >> 32)) & 0x3FFFFFFFFFFFFFFF
 
-    ``table`` (slots, 3), slots a power of two and more than twice the keys, is an open-addressing
-    hash set that remembers between calls; a row of least integers is a free slot.
+
+@_compiled
+def first_of_each(fresh: IntArray, keys: IntArray, filled: int, table: IntArray) -> IntArray:
+    """The rows of ``fresh`` (k, 3) that are not among the first ``filled`` of ``keys``, first occurrences only.
+
+    They are appended to ``keys``, which has room for them. ``table`` (slots,), a power of two and more than
+    twice the keys, remembers between calls where each key is: its row, and above it part of its mixed number;
+    negative: free.
     """
-    fresh = np.empty(len(keys), np.int64)
+    rows = np.empty(len(fresh), np.int64)
     count = 0
-    mask = len(table) - 1
-    free = np.iinfo(np.int64).min
-    for k in range(len(keys)):
-        slot = (keys[k, 0] * 73856093 ^ keys[k, 1] * 19349663 ^ keys[k, 2] * 83492791) & mask
-        while table[slot, 0] != free and not (
-            table[slot, 0] == keys[k, 0] and table[slot, 1] == keys[k, 1] and table[slot, 2] == keys[k, 2]
-        ):
-            slot = (slot + 1) & mask
-        if table[slot, 0] == free:
-            table[slot] = keys[k]
-            fresh[count] = k
+    for k in range(len(fresh)):
+        key = fresh[k]
+        mixed = _mixed(key)
+        slot = mixed & (len(table) - 1)
+        while table[slot] >= 0:
+            if (table[slot] ^ mixed) >> 32 == 0:
+                known = keys[table[slot] & 0xFFFFFFFF]
+                if known[0] == key[0] and known[1] == key[1] and known[2] == key[2]:
+                    break
+            slot = (slot + 1) & (len(table) - 1)
+        if table[slot] < 0:
+            table[slot] = (mixed >> 32 << 32) | (filled + count)
+            keys[filled + count] = key
+            rows[count] = k
             count += 1
-    return fresh[:count], filled + count
+    return rows[:count]
 
 
-# --- value of a transformation (Algorithm 4, lines 5 to 19) --------------------------------------
+# --- segments ---------------------------------------------------------------------------------------
 
 
 @_compiled
-def _directions(segments):  # type: ignore[no-untyped-def]
+def directions(segments):  # type: ignore[no-untyped-def]
     """Unit vectors and lengths, (n, 3)."""
     result = np.empty((len(segments), 3))
     for i in range(len(segments)):
@@ -131,152 +156,6 @@ def _directions(segments):  # type: ignore[no-untyped-def]
         result[i, 1] = dy / length
         result[i, 2] = length
     return result
-
-
-@_compiled
-def _move(segments, directions, pose, moved, turned):  # type: ignore[no-untyped-def]
-    cosine = math.cos(pose[2])
-    sine = math.sin(pose[2])
-    for j in range(len(segments)):
-        for k in (0, 2):
-            moved[j, k] = cosine * segments[j, k] - sine * segments[j, k + 1] + pose[0]
-            moved[j, k + 1] = sine * segments[j, k] + cosine * segments[j, k + 1] + pose[1]
-        turned[j, 0] = cosine * directions[j, 0] - sine * directions[j, 1]
-        turned[j, 1] = sine * directions[j, 0] + cosine * directions[j, 1]
-        turned[j, 2] = directions[j, 2]
-
-
-@_inlined
-def _common_length(t, u, length):  # type: ignore[no-untyped-def]
-    """Length of [0, length] within the interval between t and u."""
-    return max(0.0, min(max(t, u), length) - max(min(t, u), 0.0))
-
-
-@_inlined
-def _meets(start, end):  # type: ignore[no-untyped-def]
-    """Whether a segment with these signed distances from a line meets it, touching included."""
-    return min(start, end) <= TOUCH and max(start, end) >= -TOUCH
-
-
-@_inlined
-def _matching_value(s1, d1, s2, d2, limit, rate):  # type: ignore[no-untyped-def]
-    """Matching value of two segments (lines 9 to 17); ``rate`` is log(penalty) / tolerance."""
-    cx = s2[0] - s1[0]
-    cy = s2[1] - s1[1]
-    dx = s2[2] - s1[0]
-    dy = s2[3] - s1[1]
-    start_2 = d1[0] * cy - d1[1] * cx  # signed distances of the extremes of s2 from the line of s1
-    end_2 = d1[0] * dy - d1[1] * dx
-    far_2 = max(abs(start_2), abs(end_2))
-    bx = s2[0] - s1[2]
-    by = s2[1] - s1[3]
-    start_1 = d2[1] * cx - d2[0] * cy  # and of those of s1 from the line of s2
-    end_1 = d2[1] * bx - d2[0] * by
-    distance = min(far_2, max(abs(start_1), abs(end_1)))
-    if distance > limit:
-        return 0.0
-    l1 = _common_length(d1[0] * cx + d1[1] * cy, d1[0] * dx + d1[1] * dy, d1[2])
-    l2 = _common_length(-(d2[0] * cx + d2[1] * cy), -(d2[0] * bx + d2[1] * by), d2[2])
-    value = 0.5 * (l1 + l2)
-    if value > 0.0 and not (_meets(start_2, end_2) and _meets(start_1, end_1)):
-        value *= math.exp(rate * distance)
-    return value
-
-
-@_inlined
-def _crosses(s1, d1, s2, d2, tolerance, sine_refuse):  # type: ignore[no-untyped-def]
-    """Whether two segments meet inside both, farther than ``tolerance`` from all four extremes."""
-    if abs(d1[0] * d2[1] - d1[1] * d2[0]) <= sine_refuse:
-        return False
-    start_2 = d1[0] * (s2[1] - s1[1]) - d1[1] * (s2[0] - s1[0])
-    end_2 = d1[0] * (s2[3] - s1[1]) - d1[1] * (s2[2] - s1[0])
-    start_1 = d2[0] * (s1[1] - s2[1]) - d2[1] * (s1[0] - s2[0])
-    end_1 = d2[0] * (s1[3] - s2[1]) - d2[1] * (s1[2] - s2[0])
-    if not (_meets(start_2, end_2) and _meets(start_1, end_1)):
-        return False
-    along_2 = d2[2] * start_2 / (start_2 - end_2)
-    along_1 = d1[2] * start_1 / (start_1 - end_1)
-    return min(min(along_1, d1[2] - along_1), min(along_2, d2[2] - along_2)) > tolerance
-
-
-@_compiled
-def _contradicts(s1, d1, long_1, s2, d2, long_2, tolerance, sine_refuse):  # type: ignore[no-untyped-def]
-    for i in long_1:
-        for j in long_2:
-            if _crosses(s1[i], d1[i], s2[j], d2[j], tolerance, sine_refuse):
-                return True
-    return False
-
-
-@_compiled
-def evaluate(
-    segments_1: FloatArray,
-    segments_2: FloatArray,
-    poses: FloatArray,
-    tolerance: float,
-    threshold: float,
-    penalty: float,
-    refuse_length: float,
-    refuse_angle: float,
-) -> FloatArray:
-    """The value of each candidate ``T_1_2`` of ``poses`` (k, 3), shape (k,); NaN: discarded.
-
-    Every pair of segments of every candidate is looked at, and summed in index order.
-    """
-    values = np.empty(len(poses))
-    directions_1 = _directions(segments_1)
-    directions_2 = _directions(segments_2)
-    long_1 = np.flatnonzero(directions_1[:, 2] > refuse_length)
-    long_2 = np.flatnonzero(directions_2[:, 2] > refuse_length)
-    moved = np.empty_like(segments_2)
-    turned = np.empty_like(directions_2)
-    limit = threshold * tolerance
-    rate = math.log(penalty) / tolerance
-    sine_refuse = max(math.sin(refuse_angle), TOUCH)
-    for k in range(len(poses)):
-        _move(segments_2, directions_2, poses[k], moved, turned)
-        if _contradicts(segments_1, directions_1, long_1, moved, turned, long_2, tolerance, sine_refuse):
-            values[k] = np.nan
-            continue
-        value = 0.0
-        for i in range(len(segments_1)):
-            for j in range(len(moved)):
-                value += _matching_value(segments_1[i], directions_1[i], moved[j], turned[j], limit, rate)
-        values[k] = value
-    return values
-
-
-@_compiled
-def matching_pairs(
-    segments_1: FloatArray,
-    segments_2: FloatArray,
-    pose: FloatArray,
-    tolerance: float,
-    threshold: float,
-    penalty: float,
-    least: float,
-) -> tuple[IntArray, FloatArray]:
-    """The pairs (i, j) whose matching value under one pose is above ``least``, (m, 2), and the values, (m,)."""
-    directions_1 = _directions(segments_1)
-    directions_2 = _directions(segments_2)
-    moved = np.empty_like(segments_2)
-    turned = np.empty_like(directions_2)
-    _move(segments_2, directions_2, pose, moved, turned)
-    limit = threshold * tolerance
-    rate = math.log(penalty) / tolerance
-    pairs = []
-    values = []
-    for i in range(len(segments_1)):
-        for j in range(len(moved)):
-            value = _matching_value(segments_1[i], directions_1[i], moved[j], turned[j], limit, rate)
-            if value > least:
-                pairs.append((i, j))
-                values.append(value)
-    indices = np.empty((len(pairs), 2), np.int64)
-    for k in range(len(pairs)):
-        indices[k, 0] = pairs[k][0]
-        indices[k, 1] = pairs[k][1]
-    return indices, np.array(values)
 
 
 # --- fusion (Algorithm 5) -------------------------------------------------------------------------
@@ -332,9 +211,9 @@ def covers(edges: FloatArray, segments: FloatArray, reach: float) -> FloatArray:
     Returns (k, n, 2): from and to, metres from the start of the edge, within it; equal where there is none.
     """
     result = np.zeros((len(edges), len(segments), 2))
-    directions = _directions(edges)
+    axes = directions(edges)
     for k in range(len(edges)):
-        ux, uy, length = directions[k, 0], directions[k, 1], directions[k, 2]
+        ux, uy, length = axes[k, 0], axes[k, 1], axes[k, 2]
         for i in range(len(segments)):
             ax = segments[i, 0] - edges[k, 0]
             ay = segments[i, 1] - edges[k, 1]

@@ -24,7 +24,7 @@ __all__ = ["HEURISTICS", "PAPER_HEURISTICS", "Angles", "Candidates", "angles", "
 
 POSE_RESOLUTION = 1e-9
 """metres and radians; poses that agree to this are one pose"""
-BLOCK = 1 << 18
+BLOCK = 1 << 22
 """most pairs of angles compared at a time"""
 DRAWS = 20
 """N_k = 20 * 2^k draws in round k (Algorithm 3, line 3)"""
@@ -71,12 +71,17 @@ class Candidates:
         return len(self.poses)
 
     def take(self, rows: IntArray) -> Candidates:
-        """Some of the candidates."""
-        return Candidates(self.poses[rows], self.angles_1[rows], self.angles_2[rows], self.draws)
+        """Some of the candidates; all of them as they are."""
+        if len(rows) == len(self) and np.array_equal(rows, np.arange(len(self))):
+            return self
+        poses = self.poses.take(rows, axis=0)
+        return Candidates(poses, self.angles_1.take(rows, axis=0), self.angles_2.take(rows, axis=0), self.draws)
 
     @classmethod
     def joined(cls, blocks: Sequence[Candidates]) -> Candidates:
         """Blocks of candidates in a row."""
+        if len(blocks) == 1:
+            return blocks[0]
         return cls(
             np.concatenate([np.empty((0, 3)), *(block.poses for block in blocks)]),
             np.concatenate([np.empty((0, 2), np.int64), *(block.angles_1 for block in blocks)]),
@@ -246,7 +251,7 @@ def _superimposed(angles_1: Angles, angles_2: Angles, parameters: Parameters) ->
         angles_2.vertices,
         parameters.angle_difference_tolerance,
     )
-    return Candidates(poses, angles_1.segments[rows_1], angles_2.segments[rows_2])
+    return Candidates(poses, angles_1.segments.take(rows_1, axis=0), angles_2.segments.take(rows_2, axis=0))
 
 
 def _random_candidates(map_1: SegmentMap, map_2: SegmentMap, parameters: Parameters) -> Iterator[Candidates]:
@@ -342,25 +347,23 @@ class _Seen:
     """Poses seen so far, to the resolution above."""
 
     def __init__(self) -> None:
-        self._table = self._free(1 << 12)
+        self._keys = np.empty((0, 3), np.int64)
+        self._table = np.empty(0, np.int64)
         self._filled = 0
-
-    @staticmethod
-    def _free(slots: int) -> IntArray:
-        return np.full((slots, 3), np.iinfo(np.int64).min)
 
     def new(self, poses: FloatArray) -> IntArray:
         """The rows of poses that were not seen before."""
         keys = np.round(poses / POSE_RESOLUTION).astype(np.int64)
-        self._grow(len(keys))
-        rows, self._filled = _kernels.first_of_each(keys, self._table, self._filled)
+        self._make_room(len(keys))
+        rows: IntArray = _kernels.first_of_each(keys, self._keys, self._filled, self._table)
+        self._filled += len(rows)
         return rows
 
-    def _grow(self, more: int) -> None:
-        slots = len(self._table)
-        while slots < 2 * (self._filled + more) + 1:
-            slots *= 2
-        if slots > len(self._table):
-            held = self._table[self._table[:, 0] != np.iinfo(np.int64).min]
-            self._table = self._free(slots)
-            _kernels.first_of_each(held, self._table, 0)
+    def _make_room(self, more: int) -> None:
+        """Room for so many more keys; it grows at least twofold, and the keys held are placed anew."""
+        if self._filled + more <= len(self._keys):
+            return
+        held, room = self._keys[: self._filled], max(self._filled + more, 2 * len(self._keys))
+        self._keys = np.empty((room, 3), np.int64)
+        self._table = np.full(1 << (2 * room).bit_length(), -1)
+        _kernels.first_of_each(held, self._keys, 0, self._table)

@@ -11,11 +11,11 @@ import numpy as np
 from segmap.candidates import HEURISTICS, PAPER_HEURISTICS, Candidates, candidates
 from segmap.chains import matching_chains
 from segmap.errors import ParameterError
-from segmap.evaluation import best, evaluate, matching_values
+from segmap.evaluation import Best, matching_values, search
 from segmap.fusion import Fusion, fuse
 from segmap.matches import Candidate, Match
 from segmap.parameters import Parameters
-from segmap.pose import FloatArray, IntArray, Pose2
+from segmap.pose import IntArray, Pose2
 from segmap.refinement import uncertainties
 from segmap.segments import SegmentMap
 from segmap.verdict import Findings, Verdict, confidence, findings, judge
@@ -165,32 +165,28 @@ class _Found:
 
 
 def _as_the_paper(task: _Task) -> _Found:
-    """Algorithms 2 or 3, then 4: every candidate's value, and the best."""
-    found, values = _evaluated(task, task.heuristic)
-    ranked = tuple(_candidate(found, values, row) for row in best(values, task.parameters.ranked_candidates))
-    return _Found(ranked, len(values), int(np.isnan(values).sum()), found.draws)
+    """Algorithms 2 or 3, then 4: the best of all candidates by value."""
+    found = Candidates.joined(list(_tried(task)))
+    top = _best(task, found, task.parameters.ranked_candidates)
+    ranked = tuple(_candidate(found, row, value) for row, value in zip(top.rows, top.values, strict=True))
+    return _Found(ranked, len(found), top.discarded, found.draws)
 
 
-def _evaluated(task: _Task, heuristic: str) -> tuple[Candidates, FloatArray]:
-    """All candidates and their values; ``random`` may stop after a round that is good enough (III-A2)."""
-    blocks: list[Candidates] = []
-    values: list[FloatArray] = []
-    for block in candidates(task.map_1, task.map_2, heuristic, task.parameters):
-        blocks.append(block)
-        values.append(
-            evaluate(task.map_1, task.map_2, block.poses, task.parameters, workers=task.workers, check=task.check)
-        )
-        if block.draws and _good_enough(values[-1], task.parameters.good_enough):
+def _tried(task: _Task) -> Iterator[Candidates]:
+    """The blocks of candidates; ``random`` may stop after a round that is good enough (III-A2)."""
+    enough = task.parameters.good_enough
+    for block in _checked(candidates(task.map_1, task.map_2, task.heuristic, task.parameters), task):
+        yield block
+        if block.draws and enough is not None and (_best(task, block, 1).values >= enough).any():
             break
-    return Candidates.joined(blocks), np.concatenate([np.empty(0), *values])
 
 
-def _good_enough(values: FloatArray, enough: float | None) -> bool:
-    return enough is not None and bool((values >= enough).any())
+def _best(task: _Task, found: Candidates, count: int) -> Best:
+    return search(task.map_1, task.map_2, found.poses, task.parameters, count, workers=task.workers, check=task.check)
 
 
-def _candidate(found: Candidates, values: FloatArray, row: int) -> Candidate:
-    return Candidate(Pose2(*found.poses[row]), float(values[row]), *_angles(found, row), index=int(row))
+def _candidate(found: Candidates, row: int, value: float) -> Candidate:
+    return Candidate(Pose2(*found.poses[row]), float(value), *_angles(found, row), index=int(row))
 
 
 def _angles(found: Candidates, row: int) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -239,8 +235,8 @@ def _worth_judging(task: _Task, block: Candidates) -> tuple[IntArray, int]:
     most = task.parameters.judged_candidates
     if len(block) <= most:
         return np.arange(len(block)), 0
-    values = evaluate(task.map_1, task.map_2, block.poses, task.parameters, workers=task.workers, check=task.check)
-    return np.sort(best(values, most)), int(np.isnan(values).sum())
+    top = _best(task, block, most)
+    return np.sort(top.rows), top.discarded
 
 
 def _ranked(task: _Task, found: Candidates, kept: Verified, seen: Views) -> tuple[Candidate, ...]:
