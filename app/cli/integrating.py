@@ -19,12 +19,11 @@ from app.cli.options import (
     Preset,
     Setting,
     method_of,
-    read,
+    segment_maps,
 )
 from app.cli.output import pose_json, print_facts, print_json, show_pose
 from segmap.explanation import explain
 from segmap.integration import Candidate, Match, match_maps
-from segmap.segments import extract
 
 __all__ = ["integrate"]
 
@@ -40,16 +39,20 @@ def integrate(
     explained: Explain = False,
     as_json: Json = False,
 ) -> None:
-    """Find the pose of scan J in the frame of scan I, from their segments alone."""
-    laser_log, method = read(log), method_of(mode, heuristic, preset, settings)
-    map_1, map_2 = (extract(laser_log.scan(index), method.parameters, index=index) for index in (first, second))
+    """Find the pose of scan J in the frame of scan I, from their segments alone.
+
+    A file of segment maps, such as an exported GeoJSON file, takes the place of a log: I and J are then its maps.
+    """
+    method = method_of(mode, heuristic, preset, settings)
+    name, map_of = segment_maps(log, method.parameters)
+    map_1, map_2 = map_of(first), map_of(second)
     match = match_maps(map_1, map_2, method.parameters, method.heuristic, method.mode)
     explanation = None
     if explained and match.T_1_2 is not None:
         explanation = explain(map_1, map_2, match.T_1_2, method.parameters, sights=method.mode != "paper")
     if as_json:
         more = {"explanation": explanation_json(match, explanation)} if explained else {}
-        print_json({"log": laser_log.name, "scans": [first, second], **_document(match), **more})
+        print_json({"log": name, "scans": [first, second], **_document(match), **more})
         return
     print_facts(_facts(match, first, second))
     if explanation is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, TypeAlias
@@ -11,9 +11,10 @@ import typer
 
 from segmap.errors import ParameterError
 from segmap.integration import DEFAULT_HEURISTIC, DEFAULT_PRESET, MODES, chosen_heuristic, heuristics
-from segmap.logs import ANY_SIZE, read_log, read_logs
+from segmap.logs import ANY_SIZE, holds_maps, read_log, read_logs, read_maps
 from segmap.parameters import PRESETS, Parameters, preset
 from segmap.scans import LaserLog
+from segmap.segments import SegmentMap, extract
 
 __all__ = [
     "DEFAULT_MODE",
@@ -31,6 +32,7 @@ __all__ = [
     "parameters_of",
     "read",
     "read_all",
+    "segment_maps",
     "topic_of",
 ]
 
@@ -127,6 +129,17 @@ def read_all(path: Path) -> list[LaserLog]:
     if topic_of(path)[1] is not None:
         return [read(path)]
     return [_told(log) for log in read_logs(path, limits=ANY_SIZE)]
+
+
+def segment_maps(path: Path, parameters: Parameters) -> tuple[str, Callable[[int], SegmentMap]]:
+    """The name of a log or of a file of segment maps, and its maps by index: of scans, or as the file holds them."""
+    if holds_maps(topic_of(path)[0]):
+        maps = read_maps(path)
+        for problem in maps.problems:
+            typer.echo(f"segmap: {maps.name}: {problem}", err=True)
+        return maps.name, lambda index: maps.part(index).map
+    log = read(path)
+    return log.name, lambda index: extract(log.scan(index), parameters, index=index)
 
 
 def open_log(path: Path) -> LaserLog:

@@ -21,7 +21,7 @@ from segmap.logs.ranges_json import RANGES_JSON, RANGES_JSON_LINES
 from segmap.logs.records import Format, Problems, Record
 from segmap.logs.rosbag1 import ROS_1_BAG
 from segmap.logs.rosbag2 import ROS_2_BAG
-from segmap.logs.segment_maps import MapPart, MapsFile, is_maps, read_maps
+from segmap.logs.segment_maps import MapPart, MapsFile, holds_maps, is_maps, read_maps
 from segmap.logs.source import ANY_SIZE, Limits, LogFile, LogSource, base_name, name_of
 from segmap.logs.text import printable, shown
 from segmap.scans import LaserLog, LaserScan
@@ -35,7 +35,7 @@ __all__ = [
     "MapPart",
     "MapsFile",
     "base_name",
-    "is_maps",
+    "holds_maps",
     "read_log",
     "read_logs",
     "read_maps",

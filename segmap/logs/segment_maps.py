@@ -26,7 +26,7 @@ from segmap.logs.text import MalformedError, printable
 from segmap.scans import LogProblem
 from segmap.segments import SegmentMap, Source
 
-__all__ = ["MapPart", "MapsFile", "is_maps", "read_maps"]
+__all__ = ["MapPart", "MapsFile", "holds_maps", "is_maps", "read_maps"]
 
 LARGEST = 1 << 25
 """bytes of the largest file of maps"""
@@ -67,6 +67,16 @@ def is_maps(head: bytes) -> bool:
     """Whether the first bytes of a file, decompressed, are those of a file of segment maps."""
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
     return text[:1] == b"{" and bool(_GEOJSON.search(text) or _PLAIN.search(text))
+
+
+def holds_maps(source: LogSource) -> bool:
+    """Whether a file, which is not a stream, holds segment maps, by its first bytes.
+
+    Raises:
+        LogError: it cannot be opened.
+    """
+    with LogFile(source) as file:
+        return is_maps(file.head())
 
 
 def read_maps(source: LogSource, name: str | None = None, limits: Limits | None = None) -> MapsFile:
