@@ -7,7 +7,9 @@ the paper's S4 and S5) at the paper's parameters, no candidate left out, after w
 of the tests (tests/helpers/plain_reading.py) on every 40th of the same candidates, extrapolated, as a ratio. A
 candidate that long crossing segments discard costs less; without discarding, all pairs of segments are summed.
 The least time is beside the median: on a machine that others use it says more of the program.
-exact: candidates, values and the best of all, for 47 x 36 and 63 x 63 segments, `all`, paper mode.
+exact: from two maps to the best of all candidates, for 47 x 36 and 63 x 63 segments, `all`, paper mode; of that,
+finding the candidates and searching them; beside the search the value of every candidate (brute force) and the
+numpy twin, as ratios. That all give the same best is checked first.
 pairs: every pair of the benchmark from ranges to verdict on one thread, each the median of its repeats.
 Medians throughout; the load of the machine is printed with them.
 """
@@ -29,7 +31,7 @@ from common import LogPairs, arguments, load, markdown, provenance, trimmed
 
 from segmap.benchmark import run_pairs
 from segmap.candidates import Candidates, candidates
-from segmap.evaluation import evaluate
+from segmap.evaluation import best, evaluate, search
 from segmap.integration import DEFAULT_HEURISTIC, match_maps
 from segmap.parameters import Parameters, preset
 from segmap.pose import FloatArray
@@ -40,6 +42,8 @@ PAPER_CANDIDATES = 41_260
 LARGE_SIZES = (63, 63)
 TWIN_SHARE = 40
 """the twin evaluates every so manieth candidate"""
+TWIN_LEAST = 1000
+"""candidates the twin evaluates where the exact best is sought"""
 NO_DISCARD = 100.0
 """metres; no segment is longer, so none discards"""
 THREADS = 2
@@ -77,7 +81,7 @@ def timed(run: Callable[[], object], repeats: int) -> Timing:
 
 def poses_between(maps: Maps, count: int, parameters: Parameters) -> FloatArray:
     """``count`` of all candidates, evenly spread; fewer where there are fewer."""
-    poses = Candidates.joined(list(candidates(*maps, "all", parameters))).poses
+    poses = _all_candidates(maps, parameters).poses
     chosen: FloatArray = poses[np.unique(np.linspace(0, len(poses) - 1, min(count, len(poses))).astype(int))]
     return chosen
 
@@ -115,15 +119,34 @@ def plain_reading() -> ModuleType:
 
 
 def exact_table(sized: Sequence[Maps], parameters: Parameters, repeats: int) -> str:
-    """Milliseconds from two maps to the best of all candidates on one thread and two: median (least)."""
-    rows = []
-    for maps in sized:
-        found = match_maps(*maps, parameters, "all")
-        times = [timed(partial(match_maps, *maps, parameters, "all", workers=n), repeats) for n in (1, THREADS)]
-        size = " x ".join(str(len(scan)) for scan in maps)
-        shown = [one.shown(1000.0, 0) for one in times]
-        rows.append([size, f"{found.candidates:,}", f"{found.value:.2f}", *shown])
-    return markdown(["Segments", "candidates", "best, m", "1 thread, ms", f"{THREADS} threads, ms"], rows)
+    """Milliseconds from two maps to the best of all candidates on one thread and two, and of what: median (least)."""
+    header = ["Segments", "candidates", "best, m", "1 thread, ms", f"{THREADS} threads, ms", "candidates alone, ms"]
+    header += [f"{what}, {THREADS} threads, ms" for what in ("search alone", "every value")]
+    return markdown(
+        [*header, "every value / search", "numpy twin / search"], [_exact_row(m, parameters, repeats) for m in sized]
+    )
+
+
+def _exact_row(maps: Maps, parameters: Parameters, repeats: int) -> list[str]:
+    wanted = parameters.ranked_candidates
+    tried = partial(_all_candidates, maps, parameters)
+    poses = tried().poses
+    values, found = evaluate(*maps, poses, parameters), search(*maps, poses, parameters, wanted)
+    if not (np.array_equal(found.rows, best(values, wanted)) and np.array_equal(found.values, values[found.rows])):
+        raise SystemExit("The search gives other candidates than all values: the times cannot be compared.")
+    whole = [timed(partial(match_maps, *maps, parameters, "all", workers=n), repeats) for n in (1, THREADS)]
+    alone = timed(partial(search, *maps, poses, parameters, wanted, workers=THREADS), repeats)
+    every = timed(partial(evaluate, *maps, poses, parameters, workers=THREADS), repeats)
+    few = poses[:: max(1, len(poses) // TWIN_LEAST)]
+    plain = timed(lambda: plain_reading().values(*maps, few, parameters), 1).median * len(poses) / len(few)
+    shown = [one.shown(1000.0, 1) for one in (*whole, timed(tried, repeats), alone, every)]
+    ratios = [f"{every.median / alone.median:.1f}", f"{plain / alone.median:.0f}"]
+    size = " x ".join(str(len(scan)) for scan in maps)
+    return [size, f"{len(poses):,}", f"{max(found.values, default=0.0):.2f}", *shown, *ratios]
+
+
+def _all_candidates(maps: Maps, parameters: Parameters) -> Candidates:
+    return Candidates.joined(list(candidates(*maps, "all", parameters)))
 
 
 # --- a pair, from ranges to verdict ---------------------------------------------------------------

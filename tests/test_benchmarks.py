@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from segmap.benchmark import Pair
+from segmap.integration import match_maps
 from segmap.logs import read_log
 from segmap.parameters import Parameters, preset
 from segmap.pose import Pose2
@@ -165,11 +166,22 @@ def test_twins_that_differ_are_not_compared(script, held, monkeypatch):
         speed.evaluation_table(maps, speed.poses_between(maps, 50, QUICK), QUICK, repeats=1)
 
 
+def test_a_search_that_finds_others_is_not_timed(script, held, monkeypatch):
+    """Nor does a search that misses the best count as fast."""
+    speed = script("speed")
+    monkeypatch.setattr(speed, "best", lambda *_: np.zeros(1, int))
+    with pytest.raises(SystemExit, match="other candidates"):
+        speed.exact_table([script("common").trimmed([held], (6, 5), QUICK)], QUICK, repeats=1)
+
+
 def test_the_exact_best_and_the_pairs_are_timed(script, held):
     """Sizes, candidates and every pair appear; a 95th percentile is no less than the median."""
     speed = script("speed")
     maps = script("common").trimmed([held], (6, 5), QUICK)
-    assert cells(speed.exact_table([maps], QUICK, repeats=1))[1][0] == "6 x 5"
+    header, row = cells(speed.exact_table([maps], QUICK, repeats=1))
+    assert row[:2] == ["6 x 5", str(match_maps(*maps, QUICK, "all").candidates)]
+    assert header[-2:] == ["every value / search", "numpy twin / search"]
+    assert float(row[-2]) > 0.0
     _, office_row, all_row = cells(speed.pairs_table([held], repeats=1))
     assert office_row[:2] == ["office", "3"]
     assert all_row[:2] == ["all", "3"]
