@@ -7,7 +7,13 @@ least squares, with a robust kernel that silences edges the others contradict.
 from __future__ import annotations
 
 from segmap.graph.edges import SOURCES, Covariance, Edge, components
-from segmap.graph.optimising import BACKENDS, GATE, Iteration, Optimised, Residual, optimise
+from segmap.graph.marginals import Marginals, Softness
+from segmap.graph.optimised import Iteration, Optimised, Residual
+from segmap.graph.optimising import BACKENDS, GATE, optimise
+from segmap.graph.previewing import Preview, Shift, preview
+from segmap.graph.strength import Strength, strength
+from segmap.graph.ways import Loop, Ways, loop_of
+from segmap.graph.words import explain
 
 __all__ = [
     "BACKENDS",
@@ -16,8 +22,19 @@ __all__ = [
     "Covariance",
     "Edge",
     "Iteration",
+    "Loop",
+    "Marginals",
     "Optimised",
+    "Preview",
     "Residual",
+    "Shift",
+    "Softness",
+    "Strength",
+    "Ways",
     "components",
+    "explain",
+    "loop_of",
     "optimise",
+    "preview",
+    "strength",
 ]

@@ -18,7 +18,7 @@ from segmap.graph.edges import Edge
 from segmap.pose import FloatArray, IntArray, wrap
 from segmap.scans import ScanId
 
-__all__ = ["EdgeArrays", "System", "gaps", "moved", "residuals", "slopes"]
+__all__ = ["EdgeArrays", "System", "adjoints", "composed", "gaps", "inverted", "moved", "residuals", "slopes", "turns"]
 
 NEARLY_STRAIGHT = 1e-4
 """radians; below, the series is more exact than the formula"""
@@ -44,7 +44,7 @@ class EdgeArrays:
         """Edges between scans numbered by ``places``."""
         measured = np.array([tuple(edge.T_1_2) for edge in edges]).reshape(-1, 3)
         covariances = np.array([edge.covariance for edge in edges]).reshape(-1, 3, 3)
-        turn = _turns(-measured[:, 2])
+        turn = turns(-measured[:, 2])
         held = np.linalg.inv(turn @ covariances @ turn.transpose(0, 2, 1))
         return cls(
             np.array([places[edge.first] for edge in edges], np.int64),
@@ -70,7 +70,7 @@ class EdgeArrays:
         return np.einsum("eij,ej->ei", self.whitening, residuals(poses, self))
 
 
-def _turns(angles: FloatArray) -> FloatArray:
+def turns(angles: FloatArray) -> FloatArray:
     """Rotations of the plane acting on (x, y, theta), (m, 3, 3)."""
     turns = np.zeros((len(angles), 3, 3))
     turns[:, 0, 0] = turns[:, 1, 1] = np.cos(angles)
@@ -121,10 +121,10 @@ def slopes(poses: FloatArray, edges: EdgeArrays) -> tuple[FloatArray, FloatArray
     h, rise = _half_cotangent(theta)
     straight = _straightening(h, theta / 2.0)
     bend = np.stack((rise * place[:, 0] + place[:, 1] / 2.0, rise * place[:, 1] - place[:, 0] / 2.0), axis=-1)
-    by_second = _turns(theta)
+    by_second = turns(theta)
     by_second[:, :2, :2] = straight @ by_second[:, :2, :2]
     by_second[:, :2, 2] = bend
-    into_edge = _turns(-edges.measured[:, 2])[:, :2, :2]
+    into_edge = turns(-edges.measured[:, 2])[:, :2, :2]
     arm = np.stack((-between[:, 1], between[:, 0]), axis=-1)
     by_first = np.zeros_like(by_second)
     by_first[:, :2, :2] = -(straight @ into_edge)
@@ -138,10 +138,29 @@ def _straightening(h: FloatArray, half: FloatArray) -> FloatArray:
     return np.stack((np.stack((h, half), axis=-1), np.stack((-half, h), axis=-1)), axis=-2)
 
 
+def adjoints(poses: FloatArray) -> FloatArray:
+    """The matrices (m, 3, 3) that take a small motion in the frame of each pose to the frame it is given in."""
+    matrices = turns(poses[:, 2])
+    matrices[:, 0, 2] = poses[:, 1]
+    matrices[:, 1, 2] = -poses[:, 0]
+    return matrices
+
+
+def composed(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Poses ``a @ b``, (..., 3)."""
+    x, y = _turned(a[..., 2], b[..., 0], b[..., 1])
+    return np.stack(np.broadcast_arrays(a[..., 0] + x, a[..., 1] + y, wrap(a[..., 2] + b[..., 2])), axis=-1)
+
+
+def inverted(poses: FloatArray) -> FloatArray:
+    """Inverse poses, (..., 3)."""
+    x, y = _turned(-poses[..., 2], poses[..., 0], poses[..., 1])
+    return np.stack((-x, -y, wrap(-poses[..., 2])), axis=-1)
+
+
 def moved(poses: FloatArray, deltas: FloatArray) -> FloatArray:
     """Poses (n, 3) moved by small motions (n, 3), each in its own frame."""
-    x, y = _turned(poses[:, 2], deltas[:, 0], deltas[:, 1])
-    return np.stack((poses[:, 0] + x, poses[:, 1] + y, wrap(poses[:, 2] + deltas[:, 2])), axis=-1)
+    return composed(poses, deltas)
 
 
 class System:

@@ -2,86 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from segmap.errors import GraphError
 from segmap.graph.arrays import EdgeArrays, gaps, residuals
 from segmap.graph.edges import Edge, components
-from segmap.graph.least_squares import LeastSquares
-from segmap.graph.robust import Round, graduated, settled, truncated
+from segmap.graph.least_squares import STEPS, LeastSquares
+from segmap.graph.optimised import HALF, Iteration, Optimised, Residual
+from segmap.graph.robust import Minimise, Round, graduated, reconsidered, settled, truncated
 from segmap.graph.start import first_poses
+from segmap.graph.with_gtsam import Gtsam
 from segmap.pose import FloatArray, IntArray, Pose2
 from segmap.scans import ScanId
 
-__all__ = ["BACKENDS", "GATE", "Iteration", "Optimised", "Residual", "optimise"]
+__all__ = ["BACKENDS", "GATE", "optimise"]
 
 BACKENDS = ("auto", "scipy", "gtsam")
-GATE = 4.03
-"""standard deviations; of right edges with honest covariances one in a thousand is farther off"""
-HALF = 0.5
-"""an edge with a smaller weight is silenced"""
-
-
-@dataclass(frozen=True)
-class Residual:
-    """What is left between where an edge puts its second scan and where the graph puts it."""
-
-    edge: Edge
-    translation: float
-    """metres"""
-    rotation: float
-    """radians, in [0, pi]"""
-    chi: float
-    """Mahalanobis distance: the length of the residual in standard deviations; sqrt(3) on average"""
-    weight: float
-    """0..1; how much the edge counts"""
-
-    @property
-    def silenced(self) -> bool:
-        """Whether the robust kernel takes the edge for wrong."""
-        return self.weight < HALF
-
-
-@dataclass(frozen=True, eq=False)
-class Iteration:
-    """One round of the optimiser on one component."""
-
-    component: int
-    """number of the component, from 0"""
-    error: float
-    """sum of squared Mahalanobis distances, those of silenced edges cut at the gate"""
-    silenced: int
-    """edges that do not count now"""
-    poses: FloatArray = field(repr=False)
-    """(n, 3) of the component's scans, in the frame of the first"""
-
-
-@dataclass(frozen=True, eq=False)
-class Optimised:
-    """The poses that fit the edges best."""
-
-    poses: Mapping[ScanId, Pose2]
-    """``T_first_scan`` of every scan an edge holds, in the frame of the first scan of its component"""
-    components: tuple[tuple[ScanId, ...], ...]
-    """each ascending; its first scan is the frame"""
-    residuals: tuple[Residual, ...]
-    """in the order of the edges"""
-    history: tuple[Iteration, ...] = field(repr=False)
-    backend: str
-    """``scipy`` or ``gtsam``"""
-
-    @property
-    def error(self) -> float:
-        """Sum of the squared Mahalanobis distances of the edges that count."""
-        return sum(one.weight * one.chi**2 for one in self.residuals)
-
-    @property
-    def silenced(self) -> tuple[Residual, ...]:
-        """The edges the robust kernel takes for wrong."""
-        return tuple(one for one in self.residuals if one.silenced)
+"""``auto`` is scipy: the same result whatever is installed, and the quicker of the two by far"""
+GATE = 5.0
+"""standard deviations; of right edges with honest covariances one in 65,000 is farther off"""
+MANY = 0.05
+"""of the edges that can be silenced; where more are, the other road is tried too"""
 
 
 def optimise(
@@ -122,7 +67,8 @@ def optimise(
         components=parts,
         residuals=tuple(fares[i] for i in range(len(edges))),
         history=tuple(Iteration(i, r.error, r.silenced, r.poses) for i, s in enumerate(solutions) for r in s.rounds),
-        backend=backend,
+        gate=gate if robust else math.inf,
+        backend="scipy" if backend == "auto" else backend,
     )
 
 
@@ -133,10 +79,9 @@ class _Solution:
     rounds: list[Round]
 
 
-_Solve = Callable[
-    [EdgeArrays, FloatArray, IntArray, float, Callable[[Round], None], Callable[[], None] | None],
-    tuple[FloatArray, FloatArray],
-]
+_Tell = Callable[[Round], None]
+_Check = Callable[[], None] | None
+_Solve = Callable[[EdgeArrays, FloatArray, IntArray, float, bool, _Tell, _Check], tuple[FloatArray, FloatArray]]
 
 
 def _solved(
@@ -152,7 +97,7 @@ def _solved(
     free = np.array([i for i, edge in enumerate(edges) if gate is not None and not edge.trusted], np.int64)
     start = first_poses(scans, edges, np.zeros(len(edges)), initial)
     rounds: list[Round] = []
-    poses, weights = solve(arrays, start, free, gate or np.inf, rounds.append, check)
+    poses, weights = solve(arrays, start, free, gate or np.inf, bool(initial), rounds.append, check)
     placed = {scan: Pose2(*row) for scan, row in zip(scans, poses.tolist(), strict=True)}
     return _Solution(placed, _residuals(arrays, edges, poses, weights), rounds)
 
@@ -164,32 +109,52 @@ def _residuals(arrays: EdgeArrays, edges: Sequence[Edge], poses: FloatArray, wei
 
 
 def _with_scipy(
+    edges: EdgeArrays, poses: FloatArray, free: IntArray, gate: float, known: bool, tell: _Tell, check: _Check
+) -> tuple[FloatArray, FloatArray]:
+    minimise = LeastSquares(edges, len(poses), check).minimised
+
+    def begin(poses: FloatArray) -> FloatArray:
+        return graduated(edges, poses, free, gate, tell, minimise)
+
+    return _decided(edges, poses, free, gate, known, tell, minimise, begin)
+
+
+def _with_gtsam(
+    edges: EdgeArrays, poses: FloatArray, free: IntArray, gate: float, known: bool, tell: _Tell, check: _Check
+) -> tuple[FloatArray, FloatArray]:
+    solver = Gtsam(edges, check)
+
+    def begin(poses: FloatArray) -> FloatArray:
+        return solver.graduated(poses, free, gate)
+
+    return _decided(edges, poses, free, gate, known, tell, solver.minimised, begin)
+
+
+def _decided(
     edges: EdgeArrays,
     poses: FloatArray,
     free: IntArray,
     gate: float,
-    tell: Callable[[Round], None],
-    check: Callable[[], None] | None,
+    known: bool,
+    tell: _Tell,
+    minimise: Minimise,
+    begin: Callable[[FloatArray], FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
-    """Our own least squares.
+    """Poses and weights.
 
-    The rounds can end in a place that is worse than the one they began from, where the first poses are good:
-    both are settled, and the smaller loss wins.
+    Graduated non-convexity can end in a place that is worse than the one it began from, where the first poses
+    are ``known`` to be good or much is wrong: then both are settled, and the smaller loss wins.
     """
-    solver = LeastSquares(edges, len(poses), check)
-    minimise = solver.minimised
     if not len(free):
-        weights = np.ones(len(edges))
-        poses = minimise(poses, weights)
+        poses = minimise(poses, np.ones(len(edges)), STEPS)
         tell(Round(float(edges.squares(poses).sum()), 0, poses))
-        return poses, weights
-    results = [settled(edges, poses, free, gate, tell, minimise)]
-    if not results[0][1].all():
-        begun = graduated(edges, poses, free, gate, tell, minimise)
-        results.append(settled(edges, begun, free, gate, tell, minimise))
+        return poses, np.ones(len(edges))
+    results = [settled(edges, begin(poses), free, gate, tell, minimise)]
+    if known or (results[0][1] < HALF).sum() > MANY * len(free):
+        results.append(settled(edges, poses, free, gate, tell, minimise))
     losses = [truncated(edges.squares(placed), gate, free) for placed, _ in results]
-    poses, weights = results[int(np.argmin(losses))]
-    return minimise(poses, weights), weights
+    poses, weights = reconsidered(edges, *results[int(np.argmin(losses))], free, gate, tell, minimise)
+    return minimise(poses, weights, STEPS), weights
 
 
-_BACKENDS: Mapping[str, _Solve] = {"auto": _with_scipy, "scipy": _with_scipy}
+_BACKENDS: Mapping[str, _Solve] = {"auto": _with_scipy, "scipy": _with_scipy, "gtsam": _with_gtsam}

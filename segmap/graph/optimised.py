@@ -1,0 +1,141 @@
+"""What the optimiser found: poses, how each edge fares, how sure it all is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from segmap.errors import GraphError
+from segmap.graph.arrays import EdgeArrays
+from segmap.graph.edges import Edge
+from segmap.graph.marginals import Marginals
+from segmap.graph.ways import Ways
+from segmap.pose import FloatArray, Pose2
+from segmap.scans import ScanId
+
+__all__ = ["HALF", "Iteration", "Optimised", "Residual"]
+
+HALF = 0.5
+"""an edge with a smaller weight is silenced"""
+
+
+@dataclass(frozen=True)
+class Residual:
+    """What is left between where an edge puts its second scan and where the graph puts it."""
+
+    edge: Edge
+    translation: float
+    """metres"""
+    rotation: float
+    """radians, in [0, pi]"""
+    chi: float
+    """Mahalanobis distance: the length of the residual in standard deviations; sqrt(3) on average"""
+    weight: float
+    """0..1; how much the edge counts"""
+
+    @property
+    def silenced(self) -> bool:
+        """Whether the robust kernel takes the edge for wrong."""
+        return self.weight < HALF
+
+
+@dataclass(frozen=True, eq=False)
+class Iteration:
+    """One round of the optimiser on one component."""
+
+    component: int
+    """number of the component, from 0"""
+    error: float
+    """sum of squared Mahalanobis distances, those of silenced edges cut at the gate"""
+    silenced: int
+    """edges that do not count now"""
+    poses: FloatArray = field(repr=False)
+    """(n, 3) of the component's scans, in the frame of the first"""
+
+
+@dataclass(frozen=True, eq=False)
+class Optimised:
+    """The poses that fit the edges best."""
+
+    poses: Mapping[ScanId, Pose2]
+    """``T_first_scan`` of every scan an edge holds, in the frame of the first scan of its component"""
+    components: tuple[tuple[ScanId, ...], ...]
+    """each ascending; its first scan is the frame"""
+    residuals: tuple[Residual, ...]
+    """in the order of the edges"""
+    history: tuple[Iteration, ...] = field(repr=False)
+    gate: float
+    """standard deviations beyond which an edge that is not trusted was silenced; infinite where none could be"""
+    backend: str
+    """``scipy`` or ``gtsam``"""
+
+    @property
+    def error(self) -> float:
+        """Sum of the squared Mahalanobis distances of the edges that count."""
+        return sum(one.weight * one.chi**2 for one in self.residuals)
+
+    @property
+    def silenced(self) -> tuple[Residual, ...]:
+        """The edges the robust kernel takes for wrong."""
+        return tuple(one for one in self.residuals if one.silenced)
+
+    def component_of(self, scan: ScanId) -> int | None:
+        """The number of the component that holds a scan; None where no edge does."""
+        return self._numbers.get(scan)
+
+    def counting(self, component: int) -> tuple[Edge, ...]:
+        """The edges of a component, by its number, that are not silenced."""
+        return self._counting[component]
+
+    def ways(self) -> Ways:
+        """The net of the edges that count."""
+        return Ways(edge for edges in self._counting for edge in edges)
+
+    def covariance(self, scan: ScanId, of: ScanId | None = None) -> FloatArray:
+        """Covariance (3, 3) of x, y (metres) and theta (radians) of a scan's pose in the frame of scan ``of``.
+
+        By default that of the first scan of its component. Edges that are silenced do not count.
+
+        Raises:
+            GraphError: no edge holds one of the scans, or they are in different components.
+        """
+        number = self._number(scan)
+        part = self.components[number]
+        of = part[0] if of is None else of
+        if self._number(of) != number:
+            raise GraphError(f"Scans {of} and {scan} are in different components: nothing relates their poses.")
+        return self.marginals(number).between(part.index(of), part.index(scan))
+
+    def marginals(self, component: int) -> Marginals:
+        """Covariances within a component, by its number; made when first asked for."""
+        if component not in self._marginals:
+            part = self.components[component]
+            arrays = EdgeArrays.of(self.counting(component), {scan: i for i, scan in enumerate(part)})
+            poses = np.array([tuple(self.poses[scan]) for scan in part])
+            self._marginals[component] = Marginals(arrays, poses)
+        return self._marginals[component]
+
+    @cached_property
+    def _marginals(self) -> dict[int, Marginals]:
+        return {}
+
+    @cached_property
+    def _numbers(self) -> Mapping[ScanId, int]:
+        return {scan: number for number, part in enumerate(self.components) for scan in part}
+
+    @cached_property
+    def _counting(self) -> tuple[tuple[Edge, ...], ...]:
+        kept: list[list[Edge]] = [[] for _ in self.components]
+        for residual in self.residuals:
+            if not residual.silenced:
+                kept[self._numbers[residual.edge.first]].append(residual.edge)
+        return tuple(map(tuple, kept))
+
+    def _number(self, scan: ScanId) -> int:
+        number = self.component_of(scan)
+        if number is None:
+            raise GraphError(f"No edge holds scan {scan}: its place is not known.")
+        return number
