@@ -118,7 +118,8 @@ class _Words:
 
     def floats(self, count: int) -> FloatArray:
         """Some numbers."""
-        return self._array("f4", count).astype(np.float64)
+        with np.errstate(invalid="ignore"):  # NaN of some kinds
+            return self._array("f4", count).astype(np.float64)
 
     def _array(self, kind: str, count: int) -> np.ndarray[tuple[int], np.dtype[np.generic]]:
         if self._aligned:

@@ -40,7 +40,7 @@ def _records(file: LogFile, problems: Problems) -> Iterator[Record]:
             for topic, timestamp, data in _messages(database, messages.topics):
                 messages.step()
                 yield from _record(topic, timestamp, data, messages)
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:  # names and messages of SQLite may be any bytes
             messages.problem(f"the bag cannot be read after this one ({error}); what came before was read")
 
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 import gzip
 
 import numpy as np
+import pytest
+from fuzzing import changed, readers
+from fuzzing import outcome as result_of
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -89,3 +92,21 @@ def test_one_changed_byte_costs_one_scan(small_log, data):
     whole, log = read_log(small_log), read_log(bytes(content))
     expected = [scan.ranges.tolist() for scan in whole if scan.line != line]
     assert [scan.ranges.tolist() for scan in log if scan.line != line] == expected
+
+
+READERS = readers()
+
+
+@pytest.mark.parametrize("name", READERS)
+@given(st.randoms(use_true_random=False), st.sampled_from(sorted(READERS)))
+@settings(max_examples=60, suppress_health_check=[HealthCheck.differing_executors])
+def test_files_of_every_kind_after_accidents(name, chance, other):
+    """A file changed at random in some places is read or refused in a sentence; benchmarks/fuzz_readers.py goes on."""
+    read, good = READERS[name]
+    assert result_of(read, changed(good, chance, READERS[other][1])) in ("read", "refused")
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_the_files_that_are_changed_are_good(name):
+    """Without an accident every reader reads its file."""
+    assert result_of(*READERS[name]) == "read"
