@@ -26,6 +26,8 @@ POSE_RESOLUTION = 1e-9
 """metres and radians; poses that agree to this are one pose"""
 BLOCK = 1 << 22
 """most pairs of angles compared at a time"""
+MOST_LAID = 6_600
+"""pairs of segments of partial maps that are laid on each other; with more, the longest of either map"""
 DRAWS = 20
 """N_k = 20 * 2^k draws in round k (Algorithm 3, line 3)"""
 
@@ -316,9 +318,11 @@ def _equal_drawn(
 def _extreme_candidates(map_1: SegmentMap, map_2: SegmentMap) -> Iterator[Candidates]:
     """Beyond the paper: a segment of map 2 laid on one of map 1, starts, ends or middles together.
 
-    Three candidates for each pair of segments, n_1 n_2 pairs; an undirected segment is laid both ways.
+    Three candidates for each pair of segments, n_1 n_2 pairs; an undirected segment is laid both ways. Of partial
+    maps with many segments the longest are taken.
     """
-    first, second = np.divmod(np.arange(len(map_1) * len(map_2)), max(1, len(map_2)))
+    chosen_1, chosen_2 = _chosen(map_1, map_2)
+    first, second = (chosen.ravel() for chosen in np.meshgrid(chosen_1, chosen_2, indexing="ij"))
     either_way = ~(map_1.directed[first] & map_2.directed[second])
     for turn, rows in ((0.0, slice(None)), (math.pi, either_way)):
         i, j = first[rows], second[rows]
@@ -329,6 +333,17 @@ def _extreme_candidates(map_1: SegmentMap, map_2: SegmentMap) -> Iterator[Candid
             shift = anchor_1 - _turned(anchor_2, theta)
             pairs = np.repeat(np.stack((i, j))[..., None], 2, axis=-1)
             yield Candidates(np.column_stack((shift, theta)), *pairs)
+
+
+def _chosen(map_1: SegmentMap, map_2: SegmentMap) -> tuple[IntArray, IntArray]:
+    """The segments to lay on each other: all, or the longest of maps of which one is partial and that have too many."""
+    sizes = len(map_1), len(map_2)
+    if math.prod(sizes) <= MOST_LAID or Order.NONE not in (map_1.order, map_2.order):
+        return np.arange(sizes[0]), np.arange(sizes[1])
+    most = (max(math.isqrt(MOST_LAID), MOST_LAID // max(1, other)) for other in sizes[::-1])
+    longest = (np.argsort(-m.lengths, kind="stable")[:count] for m, count in zip((map_1, map_2), most, strict=True))
+    chosen_1, chosen_2 = (np.sort(rows) for rows in longest)
+    return chosen_1, chosen_2
 
 
 def _along(segment_map: SegmentMap, rows: IntArray, share: float) -> FloatArray:
@@ -353,9 +368,8 @@ class _Seen:
 
     def new(self, poses: FloatArray) -> IntArray:
         """The rows of poses that were not seen before."""
-        keys = np.round(poses / POSE_RESOLUTION).astype(np.int64)
-        self._make_room(len(keys))
-        rows: IntArray = _kernels.first_of_each(keys, self._keys, self._filled, self._table)
+        self._make_room(len(poses))
+        rows: IntArray = _kernels.first_of_each(poses, POSE_RESOLUTION, self._keys, self._filled, self._table)
         self._filled += len(rows)
         return rows
 
@@ -365,5 +379,6 @@ class _Seen:
             return
         held, room = self._keys[: self._filled], max(self._filled + more, 2 * len(self._keys))
         self._keys = np.empty((room, 3), np.int64)
+        self._keys[: self._filled] = held
         self._table = np.full(1 << (2 * room).bit_length(), -1)
-        _kernels.first_of_each(held, self._keys, 0, self._table)
+        _kernels.place_keys(held, self._table)

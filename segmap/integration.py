@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -17,7 +18,7 @@ from segmap.matches import Candidate, Match
 from segmap.parameters import Parameters
 from segmap.pose import IntArray, Pose2
 from segmap.refinement import uncertainties
-from segmap.segments import SegmentMap
+from segmap.segments import Order, SegmentMap
 from segmap.verdict import Findings, Verdict, confidence, findings, judge
 from segmap.verification import Verified, Views, verify, views
 from segmap.visibility import evidence
@@ -44,6 +45,8 @@ AUTOMATIC = "automatic"
 """verified mode's own choice of heuristic: cheapest first, until the evidence is clear"""
 STAGES = ("extremes", "all")
 """what ``automatic`` tries in turn"""
+MOST_ANGLES = 2_000_000
+"""pairs of angles; where a partial map has more, ``automatic`` does without ``all``"""
 DEFAULT_HEURISTIC = {"paper": "all", "verified": AUTOMATIC}
 """the heuristic of each mode where none is asked for"""
 DEFAULT_PRESET = {"paper": "default", "verified": "verified"}
@@ -204,7 +207,7 @@ def _verified(task: _Task) -> _Found:
         return _as_the_paper(replace(task, heuristic=_by_value(task.heuristic)))
     found, kept, discarded = Candidates.joined([]), None, 0
     ranked: tuple[Candidate, ...] = ()
-    for heuristic in STAGES if task.heuristic == AUTOMATIC else (task.heuristic,):
+    for heuristic in _stages(task):
         block = Candidates.joined(list(_checked(candidates(task.map_1, task.map_2, heuristic, task.parameters), task)))
         rows, crossing = _worth_judging(task, block)
         if len(rows):
@@ -215,6 +218,14 @@ def _verified(task: _Task) -> _Found:
         if ranked and _judgement(ranked, task.parameters)[0] is Verdict.ACCEPTED:
             break
     return _Found(ranked, len(found), discarded, found.draws)
+
+
+def _stages(task: _Task) -> tuple[str, ...]:
+    """The heuristics to try in turn."""
+    angles = math.prod(len(m) * (len(m) - 1) // 2 for m in (task.map_1, task.map_2))
+    too_many = angles > MOST_ANGLES and Order.NONE in (task.map_1.order, task.map_2.order)
+    automatic = STAGES[:1] if too_many else STAGES
+    return automatic if task.heuristic == AUTOMATIC else (task.heuristic,)
 
 
 def _checked(blocks: Iterable[Candidates], task: _Task) -> Iterator[Candidates]:

@@ -179,6 +179,15 @@ class Parameters(BaseModel):
     pivot_form: Literal["scan", "pair"] = _parameter(
         "scan", "", "pivot: fuse each new scan (Algorithm 6), or each pair's map moved by its pivot (IV-C)."
     )
+    tree_skip: bool = _parameter(
+        True, "", "tree: try each map with the next but one first; a valid integration replaces two (IV-B)."
+    )
+    tree_skip_level: int = _parameter(
+        3, "level", "tree: skip from this level on; maps of level k hold k + 1 scans (IV-B).", ge=1, le=1000
+    )
+    bridging: bool = _parameter(
+        True, "", "Where a pair fails, try again through the scans in between that were left out (V-C)."
+    )
 
     def replace(self, **changes: Any) -> Parameters:
         """A copy with some parameters changed.

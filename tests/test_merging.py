@@ -2,36 +2,14 @@
 
 import numpy as np
 import pytest
-from worlds import room
+from sequences import POSES, WORLD, P, sequence, truth
 
 from segmap.errors import CancelledError, ParameterError
 from segmap.integration import Verdict
 from segmap.merging import map_hash, merge, merge_accepted, neighbours
-from segmap.parameters import Parameters
 from segmap.pose import Pose2
 from segmap.scans import ScanId
-from segmap.segments import Order, SegmentMap, Source
-
-P = Parameters()
-WORLD = SegmentMap.joined(
-    [room(5.0, 3.0), SegmentMap(np.array([[0.5, -0.4, 1.3, -0.4], [1.3, -0.4, 1.3, 0.3], [-1.0, 0.2, -1.6, 0.9]]))]
-)
-POSES = [Pose2(0.0, 0.0, 0.0), Pose2(0.4, 0.1, 0.3), Pose2(0.8, -0.1, 0.5), Pose2(1.0, 0.2, -0.2), Pose2(0.7, 0.4, 1.1)]
-
-
-def seen(index, T_world_scan, log=0):
-    """The world as a scan from a pose."""
-    coordinates = WORLD.moved(T_world_scan.inverse()).coordinates
-    sources = tuple((Source(log, index, i),) for i in range(len(coordinates)))
-    return SegmentMap(coordinates, Order.BEAMS, sources=sources)
-
-
-def sequence(poses=POSES, log=0):
-    return {ScanId(log, i): seen(i, T, log) for i, T in enumerate(poses)}
-
-
-def truth(a, b):
-    return POSES[a.scan].inverse() @ POSES[b.scan]
+from segmap.segments import Order, SegmentMap
 
 
 def accepted(*pairs):

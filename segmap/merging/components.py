@@ -1,34 +1,24 @@
-"""Many maps -> one map, or as many as the evidence holds together (Section IV).
-
-The pivot method (Algorithm 6) integrates neighbours in a sequence, composes their transformations and
-fuses each map once. Where a pair cannot be integrated a new component begins: nothing is ever placed
-without evidence.
-"""
+"""Components: scans that accepted integrations hold together, each with a pose, and their fused map."""
 
 from __future__ import annotations
 
 import hashlib
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from itertools import pairwise
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from segmap.chains import matching_chains
-from segmap.errors import CancelledError, ParameterError
 from segmap.fusion import fuse
-from segmap.integration import Match, Verdict, match_maps
+from segmap.merging.nodes import MergeNode
 from segmap.parameters import Parameters
 from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 
-__all__ = ["METHODS", "Accepted", "Component", "Merge", "map_hash", "merge", "merge_accepted"]
+__all__ = ["Accepted", "Component", "fused", "map_hash", "merge_accepted"]
 
-METHODS = ("pivot",)
-"""how a sequence of maps is merged"""
 HASH_RESOLUTION = 1e-6
 """metres; maps that agree to this have the same hash"""
 
@@ -47,75 +37,19 @@ class Component:
     """pose of each scan in the frame of the first one"""
     map: SegmentMap
     """in the frame of the first scan"""
+    tree: MergeNode | None = None
+    """the integrations it was made by, one by one; None where it was made of decisions"""
 
 
-@dataclass(frozen=True, eq=False)
-class Merge:
-    """What a merging method made of a sequence of maps."""
-
-    components: tuple[Component, ...]
-    matches: Mapping[tuple[ScanId, ScanId], Match]
-    """every pair INTEGRATE was called on; n - 1 of them for a sequence of n maps"""
-
-
-# --- a sequence of maps ---------------------------------------------------------------------------
-
-
-def merge(
-    maps: Mapping[ScanId, SegmentMap],
-    parameters: Parameters | None = None,
-    heuristic: str = "all",
-    mode: str = "paper",
-    method: str = "pivot",
-    *,
-    workers: int = 1,
-    progress: Callable[[int, int], None] | None = None,
-    check: Callable[[], None] | None = None,
-) -> Merge:
-    """Merge the maps of each log, in the order given, by the pivot method (Algorithm 6).
-
-    A pair counts when its verdict is accepted. ``progress`` is told how many of how many pairs are done;
-    ``workers`` pairs are matched at a time.
-
-    Raises:
-        ParameterError: there is no such method, heuristic or mode.
-        CancelledError: raised by ``check``.
-    """
-    if method not in METHODS:
-        raise ParameterError(f"There is no merging method {method!r}. Methods are: {', '.join(METHODS)}.")
-    parameters = parameters or Parameters()
-    pairs = list(neighbours(maps))
-
-    def match(pair: tuple[ScanId, ScanId]) -> Match:
-        return match_maps(maps[pair[0]], maps[pair[1]], parameters, heuristic, mode, check=check)
-
-    matches: dict[tuple[ScanId, ScanId], Match] = {}
-    for pair, result in zip(pairs, _spread(match, pairs, workers), strict=True):
-        matches[pair] = result
-        if progress is not None:
-            progress(len(matches), len(pairs))
-    accepted = [(a, b, m.T_1_2) for (a, b), m in matches.items() if m.T_1_2 and m.verdict is Verdict.ACCEPTED]
-    return Merge(merge_accepted(maps, accepted, parameters, check=check), matches)
-
-
-def neighbours(scans: Iterable[ScanId]) -> Iterator[tuple[ScanId, ScanId]]:
-    """Each scan with the next one of its log."""
-    return ((a, b) for a, b in pairwise(scans) if a.log == b.log)
-
-
-def _spread(
-    match: Callable[[tuple[ScanId, ScanId]], Match], pairs: Sequence[tuple[ScanId, ScanId]], workers: int
-) -> Iterator[Match]:
-    """The results in order, computed on some threads; what has not begun is dropped when one fails."""
-    if workers <= 1:
-        yield from map(match, pairs)
-        return
-    with ThreadPoolExecutor(workers) as pool:
-        try:
-            yield from pool.map(match, pairs)
-        except (CancelledError, GeneratorExit):
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+def fused(map_1: SegmentMap, map_2: SegmentMap, T_1_2: Pose2, parameters: Parameters) -> SegmentMap:
+    """Two maps as one in the frame of the first (Algorithm 5); a scan of both stands where it does in the first."""
+    chains = matching_chains(map_1, map_2, T_1_2, parameters)
+    whole = fuse(map_1, map_2, T_1_2, chains, parameters).map
+    held = {id(sight.scan) for sight in map_1.sights}
+    if held.isdisjoint(id(sight.scan) for sight in map_2.sights):
+        return whole
+    new = tuple(sight for sight in whole.sights[len(map_1.sights) :] if id(sight.scan) not in held)
+    return replace(whole, sights=map_1.sights + new)
 
 
 # --- accepted integrations ------------------------------------------------------------------------
@@ -136,13 +70,13 @@ def merge_accepted(
     where they agree, with the same result as from the beginning.
     """
     parameters = parameters or Parameters()
-    fused = []
+    components = []
     for number, placed in enumerate(_placed(list(maps), accepted), start=1):
         fuser = _Fuser(maps, placed, parameters)
         component_map = fuser.run(previous, check)
         poses = {scan: pose for scan, (pose, _) in placed.items()}
-        fused.append(Component(f"component {number}", tuple(placed), poses, component_map))
-    return tuple(fused)
+        components.append(Component(f"component {number}", tuple(placed), poses, component_map))
+    return tuple(components)
 
 
 _Placed = dict[ScanId, tuple[Pose2, ScanId | None]]
@@ -202,14 +136,10 @@ class _Fuser:
     def _with(self, component_map: SegmentMap, scan: ScanId) -> SegmentMap:
         T_1_scan, pivot = self.placed[scan]
         if self.parameters.pivot_form == "scan" or pivot is None:
-            return self._fused(component_map, self.maps[scan], T_1_scan)
+            return fused(component_map, self.maps[scan], T_1_scan, self.parameters)
         T_1_pivot = self.placed[pivot][0]
-        pair = self._fused(self.maps[pivot], self.maps[scan], T_1_pivot.inverse() @ T_1_scan)
-        return self._fused(component_map, pair, T_1_pivot)
-
-    def _fused(self, map_1: SegmentMap, map_2: SegmentMap, T_1_2: Pose2) -> SegmentMap:
-        chains = matching_chains(map_1, map_2, T_1_2, self.parameters)
-        return fuse(map_1, map_2, T_1_2, chains, self.parameters).map
+        pair = fused(self.maps[pivot], self.maps[scan], T_1_pivot.inverse() @ T_1_scan, self.parameters)
+        return fused(component_map, pair, T_1_pivot, self.parameters)
 
 
 def map_hash(components: Sequence[Component]) -> str:
