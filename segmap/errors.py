@@ -9,6 +9,7 @@
     ├── ProjectError       a project file or a decision that cannot be carried out
     │   └── ConflictError  somebody else decided first: look again, then decide
     ├── ExportError        a map that cannot be written in the format asked for
+    ├── DatasetError       public data that cannot be fetched, or is not what it should be
     └── CancelledError     long work was stopped because somebody asked for it
 
 Every message is one sentence or two: what is wrong, where, and what to do about it.
@@ -19,6 +20,7 @@ from __future__ import annotations
 __all__ = [
     "CancelledError",
     "ConflictError",
+    "DatasetError",
     "ExportError",
     "GraphError",
     "LogError",
@@ -64,6 +66,10 @@ class ConflictError(ProjectError):
 
 class ExportError(SegmapError):
     """A map that cannot be written in the format asked for."""
+
+
+class DatasetError(SegmapError):
+    """Public data that cannot be fetched, or is not what it should be."""
 
 
 class CancelledError(SegmapError):

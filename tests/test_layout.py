@@ -51,10 +51,11 @@ ORDER = (
     "export",
     "benchmark",
     "pair_pictures",
+    "datasets",
 )
 """The data flow: a module imports only from those before it, or from its own package."""
 WEB = {"app", "fastapi", "starlette", "uvicorn", "viser", "httpx", "websockets", "typer", "rich"}
-TOUCH_FILES = {"logs", "export", "_database", "store", "benchmark", "simulate"}
+TOUCH_FILES = {"logs", "export", "_database", "store", "benchmark", "simulate", "datasets"}
 FILE_MODULES = {"os", "shutil", "tempfile", "sqlite3", "gzip", "zipfile", "glob", "platformdirs"}
 FILE_CALLS = {"open", "read_text", "write_text", "read_bytes", "write_bytes", "mkdir", "unlink", "loadtxt", "savetxt"}
 SCENE = {"scene", "proxy"}
