@@ -19,6 +19,9 @@ __all__ = ["closest_edges", "covers", "directions", "equal_angles", "first_of_ea
 TOUCH = 1e-9
 """metres; a segment whose extreme is this near to a line touches it, whatever the rounding"""
 
+AHEAD = 64
+"""poses whose places in a table are looked up at a time"""
+
 _compiled = njit(cache=True, nogil=True, error_model="numpy")
 _inlined = njit(cache=True, nogil=True, error_model="numpy", inline="always")
 
@@ -106,39 +109,67 @@ def _superimpose(headings_1, vertex_1, headings_2, vertex_2, pose):  # type: ign
 
 
 @_inlined
-def _mixed(key):  # type: ignore[no-untyped-def]
+def _mixed(x, y, z):  # type: ignore[no-untyped-def]
     """One number of three, well mixed, not negative."""
-    mixed = key[0] * 0x1E3779B97F4A7C15 ^ key[1] * 0x42B2AE3D27D4EB4F ^ key[2] * 0x165667B19E3779F9
+    mixed = x * 0x1E3779B97F4A7C15 ^ y * 0x42B2AE3D27D4EB4F ^ z * 0x165667B19E3779F9
     mixed = (mixed ^ (mixed >> 29)) * 0x3F58476D1CE4E5B9
     return (mixed ^ (mixed >> 32)) & 0x3FFFFFFFFFFFFFFF
 
 
-@_compiled
-def first_of_each(fresh: IntArray, keys: IntArray, filled: int, table: IntArray) -> IntArray:
-    """The rows of ``fresh`` (k, 3) that are not among the first ``filled`` of ``keys``, first occurrences only.
+@_inlined
+def _slot_of(x, y, z, mixed, keys, table):  # type: ignore[no-untyped-def]
+    """The slot of a table that holds a key, or is free for it; see :func:`first_of_each`."""
+    slot = mixed & (len(table) - 1)
+    while table[slot] >= 0:
+        if (table[slot] ^ mixed) >> 32 == 0:
+            held = table[slot] & 0xFFFFFFFF
+            if keys[held, 0] == x and keys[held, 1] == y and keys[held, 2] == z:
+                break
+        slot = (slot + 1) & (len(table) - 1)
+    return slot
 
-    They are appended to ``keys``, which has room for them. ``table`` (slots,), a power of two and more than
-    twice the keys, remembers between calls where each key is: its row, and above it part of its mixed number;
-    negative: free.
+
+@_compiled
+def first_of_each(poses: FloatArray, resolution: float, keys: IntArray, filled: int, table: IntArray) -> IntArray:
+    """The rows of ``poses`` (k, 3) that to a resolution are not among the first ``filled`` keys, first ones only.
+
+    Their keys are appended to ``keys`` (m, 3), which has room for all. ``table`` (slots,), a power of two and
+    more than twice the keys, remembers between calls where each key is: its row, and above it part of its mixed
+    number; negative: free.
     """
-    rows = np.empty(len(fresh), np.int64)
+    rows = np.empty(len(poses), np.int64)
+    mixed = np.empty(AHEAD, np.int64)
+    looked = np.empty(AHEAD, np.int64)
+    some = np.empty((AHEAD, 3), np.int64)
     count = 0
-    for k in range(len(fresh)):
-        key = fresh[k]
-        mixed = _mixed(key)
-        slot = mixed & (len(table) - 1)
-        while table[slot] >= 0:
-            if (table[slot] ^ mixed) >> 32 == 0:
-                known = keys[table[slot] & 0xFFFFFFFF]
-                if known[0] == key[0] and known[1] == key[1] and known[2] == key[2]:
-                    break
-            slot = (slot + 1) & (len(table) - 1)
-        if table[slot] < 0:
-            table[slot] = (mixed >> 32 << 32) | (filled + count)
-            keys[filled + count] = key
-            rows[count] = k
-            count += 1
+    for first in range(0, len(poses), AHEAD):
+        ahead = min(AHEAD, len(poses) - first)
+        for q in range(ahead):
+            for c in range(3):
+                some[q, c] = np.int64(np.rint(poses[first + q, c] / resolution))
+            mixed[q] = _mixed(some[q, 0], some[q, 1], some[q, 2])
+        for q in range(ahead):
+            looked[q] = table[mixed[q] & (len(table) - 1)]  # memory accesses that do not wait for each other
+        for q in range(ahead):
+            slot = mixed[q] & (len(table) - 1)
+            if looked[q] >= 0 or table[slot] >= 0:
+                slot = _slot_of(some[q, 0], some[q, 1], some[q, 2], mixed[q], keys, table)
+            if table[slot] < 0:
+                table[slot] = (mixed[q] >> 32 << 32) | (filled + count)
+                for c in range(3):
+                    keys[filled + count, c] = some[q, c]
+                rows[count] = first + q
+                count += 1
     return rows[:count]
+
+
+@_compiled
+def place_keys(keys: IntArray, table: IntArray) -> None:
+    """Fill an empty table for keys (m, 3), all different; see :func:`first_of_each`."""
+    for k in range(len(keys)):
+        mixed = _mixed(keys[k, 0], keys[k, 1], keys[k, 2])
+        slot = _slot_of(keys[k, 0], keys[k, 1], keys[k, 2], mixed, keys, table)
+        table[slot] = (mixed >> 32 << 32) | k
 
 
 # --- segments ---------------------------------------------------------------------------------------

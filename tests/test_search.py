@@ -10,11 +10,10 @@ from hypothesis import strategies as st
 from worlds import maps, poses, room
 
 from segmap import evaluation
-from segmap._kernels import first_of_each
 from segmap._threads import crew
 from segmap._value_kernels import crossing
 from segmap.bounds import upper_bounds
-from segmap.candidates import Candidates, candidates
+from segmap.candidates import POSE_RESOLUTION, Candidates, _Seen, candidates
 from segmap.errors import CancelledError
 from segmap.evaluation import best, evaluate, matching_values, search
 from segmap.integration import match_maps
@@ -257,15 +256,15 @@ def test_a_value_is_the_sum_of_its_matching_values_in_index_order(map_1, map_2, 
     assert evaluate(map_1, map_2, np.array([tuple(T)]), parameters)[0] == value
 
 
-@given(st.lists(st.tuples(*[st.integers(-3, 3) | st.integers(-(2**62), 2**62)] * 3), max_size=60), st.integers(0, 60))
+whole = st.integers(-3, 3) | st.integers(-(2**53), 2**53)
+
+
+@given(st.lists(st.tuples(whole, whole, whole), max_size=200), st.lists(st.integers(0, 200), max_size=4))
 @quick
-def test_first_occurrences_are_those_of_a_set(keys, cut):
-    """Keys come in two calls; each is new once."""
-    table, held = np.full(128, -1), np.empty((60, 3), np.int64)
-    known, filled = set(), 0
-    for part in (keys[:cut], keys[cut:]):
-        rows = first_of_each(np.array(part, np.int64).reshape(-1, 3), held, filled, table)
-        filled += len(rows)
-        expected = [k for k, key in enumerate(part) if not (key in known or known.add(key))]
-        assert rows.tolist() == expected
-    assert {tuple(key) for key in held[:filled].tolist()} == known
+def test_a_pose_comes_once(keys, cuts):
+    """However many calls they come in, poses are new the first time to the resolution, and then no more."""
+    seen, known = _Seen(), set()
+    for part in np.split(np.array(keys, float).reshape(-1, 3), sorted(cuts)):
+        expected = [k for k, key in enumerate(map(tuple, part)) if not (key in known or known.add(key))]
+        jitter = np.linspace(-0.4, 0.4, 3 * len(part)).reshape(-1, 3) * (abs(part) < 2**50)
+        assert seen.new((part + jitter) * POSE_RESOLUTION).tolist() == expected
