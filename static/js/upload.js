@@ -5,7 +5,7 @@ import { fill, h, icon } from "./dom.js";
 import { count } from "./format.js";
 import { sentence } from "./problems.js";
 
-const KINDS = "CARMEN logs (FLASER, ROBOTLASER1), logs of Laser and Odometry lines, plain or .gz, or a .segmap project. Several files become one project.";
+const KINDS = "CARMEN and DP-SLAM logs, ROS bags (.bag, .db3, .mcap), CSV or JSON of ranges; or a .segmap project. Several files become one project.";
 
 /** Make `zone` accept logs; `open(project)` is called with the project made of them. */
 export function dropZone(zone, open) {
