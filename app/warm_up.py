@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from segmap.export.grid import grid_of
 from segmap.integration import MODES, heuristics, integrate
 from segmap.parameters import Parameters
 from segmap.scans import LaserScan
@@ -16,7 +17,7 @@ __all__ = ["warm_up"]
 
 
 def warm_up() -> None:
-    """Integrate two small maps in every way there is."""
+    """Integrate two small maps in every way there is, and draw one."""
     parameters = Parameters(random_rounds=1)
     headings = np.radians(np.arange(180.0) - 90.0)
     ranges = 2.0 / np.maximum(np.abs(np.cos(headings)), np.abs(np.sin(headings)))  # half a square room
@@ -26,6 +27,7 @@ def warm_up() -> None:
         for heuristic in heuristics(mode):
             for other in (room, undirected):
                 integrate(room, other, parameters, heuristic, mode)
+    grid_of(room, 0.1)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from app.jobs import WarmUp
 from app.samples import Samples
 from app.session import PICTURE, Session
 from segmap.errors import SegmapError
-from segmap.logs import ANY_SIZE, Limits, base_name
+from segmap.logs import ANY_SIZE, Limits, bag_in, base_name
 from segmap.project import ProjectState
 from segmap.scans import LaserLog
 from segmap.store import Store
@@ -182,7 +182,7 @@ class Workspace:
         Raises:
             SegmapError: a file cannot be read.
         """
-        paths = [Path(path) for path in paths]
+        paths = [bag_in(Path(path)) for path in paths]
         if len(paths) == 1 and paths[0].is_file() and _is_project(paths[0]):
             return self._adopt(paths[0])
         found = self._made_of([_digest(path) for path in paths])

@@ -11,7 +11,7 @@ import typer
 
 from segmap.errors import ParameterError
 from segmap.integration import DEFAULT_HEURISTIC, DEFAULT_PRESET, MODES, chosen_heuristic, heuristics
-from segmap.logs import ANY_SIZE, holds_maps, read_log, read_logs, read_maps
+from segmap.logs import ANY_SIZE, bag_in, holds_maps, read_log, read_logs, read_maps
 from segmap.parameters import PRESETS, Parameters, preset
 from segmap.scans import LaserLog
 from segmap.segments import SegmentMap, extract
@@ -149,13 +149,13 @@ def open_log(path: Path) -> LaserLog:
 
 
 def topic_of(path: Path) -> tuple[Path, str | None]:
-    """The file and the topic that ``FILE#TOPIC`` names; a path that exists names no topic.
+    """The file and the topic that ``FILE#TOPIC`` names; a path that exists names no topic, a folder the bag in it.
 
     >>> topic_of(Path("run.bag#/front/scan"))[1]
     '/front/scan'
     """
     file, mark, topic = path.as_posix().partition("#")
-    return (path, None) if not mark or path.exists() else (Path(file), topic)
+    return (bag_in(path), None) if not mark or path.exists() else (bag_in(Path(file)), topic)
 
 
 def _told(log: LaserLog) -> LaserLog:

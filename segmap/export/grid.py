@@ -70,7 +70,7 @@ def grid_of(component_map: SegmentMap, resolution: float) -> Grid:
     _raster.draw_lines(walls, (component_map.coordinates - (x, y, x, y)) / resolution, 1)
     _forget(cells, walls, (returns - (x, y)) / resolution)
     cells[walls > 0] = OCCUPIED
-    return Grid(cells, x, y, resolution)
+    return Grid(cells, x, y, float(resolution))
 
 
 def _different(sights: Sequence[Sight]) -> list[Sight]:

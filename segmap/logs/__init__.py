@@ -22,7 +22,7 @@ from segmap.logs.records import Format, Problems, Record
 from segmap.logs.rosbag1 import ROS_1_BAG
 from segmap.logs.rosbag2 import ROS_2_BAG
 from segmap.logs.segment_maps import MapPart, MapsFile, holds_maps, is_maps, read_maps
-from segmap.logs.source import ANY_SIZE, Limits, LogFile, LogSource, base_name, name_of
+from segmap.logs.source import ANY_SIZE, Limits, LogFile, LogSource, bag_in, base_name, name_of
 from segmap.logs.text import printable, shown
 from segmap.scans import LaserLog, LaserScan
 
@@ -34,6 +34,7 @@ __all__ = [
     "LogSource",
     "MapPart",
     "MapsFile",
+    "bag_in",
     "base_name",
     "holds_maps",
     "read_log",

@@ -20,7 +20,7 @@ from typing import IO, Any, TypeAlias
 
 from segmap.errors import LogError
 
-__all__ = ["ANY_SIZE", "Limits", "LogFile", "LogSource", "base_name", "name_of"]
+__all__ = ["ANY_SIZE", "Limits", "LogFile", "LogSource", "bag_in", "base_name", "name_of"]
 
 LogSource: TypeAlias = str | os.PathLike[str] | bytes | bytearray | memoryview | IO[bytes]
 """A path, the bytes themselves, or a binary stream (read from where it stands, and not closed)."""
@@ -72,6 +72,8 @@ class LogFile:
 
     def __init__(self, source: LogSource, name: str | None = None, limits: Limits | None = None) -> None:
         self.limits = limits or Limits()
+        if isinstance(source, str | os.PathLike) and "\0" not in os.fspath(source):
+            source = bag_in(Path(source))
         self.name = base_name(name or name_of(source))
         self._stream, self._ours = _opened(source, self.name)
         self._path = Path(source) if isinstance(source, str | os.PathLike) else None
@@ -158,6 +160,20 @@ def name_of(source: LogSource) -> str:
         return os.fspath(source)
     name = getattr(source, "name", None)
     return name if isinstance(name, str) else "log"
+
+
+def bag_in(path: Path) -> Path:
+    """The bag in a folder that ROS 2 made for it; any other path is itself.
+
+    Raises:
+        LogError: the folder holds several, parts of one recording or different ones.
+    """
+    if not path.is_dir():
+        return path
+    bags = sorted(held for held in path.iterdir() if held.suffix in (".db3", ".mcap"))
+    if len(bags) > 1:
+        raise LogError(f"{path} holds {len(bags)} bags: give the files one by one, {bags[0].name} and so on.")
+    return bags[0] if bags else path
 
 
 def _opened(source: LogSource, name: str) -> tuple[IO[bytes], bool]:

@@ -175,6 +175,15 @@ def test_a_database_is_read_where_it_lies(write, tmp_path):
             read_log(source, limits=Limits(size=4096))
 
 
+def test_the_folder_of_a_bag(tmp_path):
+    """ROS 2 makes a folder for each bag: it stands for the one file of messages in it, not for several."""
+    write_ros2(tmp_path / "run", scans(ROS_2), "MCAP")
+    assert len(read_log(tmp_path / "run")) == 5
+    (tmp_path / "run" / "run_1.mcap").write_bytes(b"")
+    with pytest.raises(LogError, match=r"run holds 2 bags: give the files one by one"):
+        read_log(tmp_path / "run")
+
+
 def test_databases_that_are_no_bags(tmp_path):
     """Another database, or one whose tables are views, is refused or told of."""
     columns = "CREATE TABLE topics (id, name, type)"
