@@ -79,7 +79,7 @@ def merge(
     for path in out or []:
         write_files(content, path)
     if trajectory is not None:
-        write_trajectory(trajectory, merged.components, laser_logs)
+        write_trajectory(trajectory, content)
     if project is not None:
         new_project(project, merged.title, sources, by, merged.accepted)
     _report(merged, as_json)

@@ -16,7 +16,6 @@ from segmap.events import Choice, Decide, IntegrationId, fingerprint
 from segmap.export import Content, write_files
 from segmap.export.tum import left_out
 from segmap.integration import Match
-from segmap.merging import Component
 from segmap.parameters import Parameters
 from segmap.scans import LaserLog, ScanId
 from segmap.store import Store
@@ -37,11 +36,11 @@ def listed(scans: Iterable[ScanId]) -> str:
     return ", ".join(map(str, scans))
 
 
-def write_trajectory(path: Path, components: Sequence[Component], logs: Sequence[LaserLog]) -> None:
+def write_trajectory(path: Path, content: Content) -> None:
     """The poses of the largest component; the scans of the others have other frames, and are listed."""
-    for remark in left_out(components):
+    for remark in left_out(content.components):
         typer.echo(f"segmap: {path.name}: {remark}", err=True)
-    write_files(Content(components, times=times_of(logs)), path, "tum")
+    write_files(content, path, "tum")
 
 
 def times_of(logs: Sequence[LaserLog]) -> dict[ScanId, float | None]:
