@@ -1,0 +1,200 @@
+"""A log -> its keyframes and how they hang together, without odometry.
+
+Keyframes are as far apart as integration stays sure: every scan is matched with the last keyframe until that
+fails, and half-way between two such failures another keyframe is put, so that each sees the next three.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from joblib import Parallel, delayed
+
+from segmap.integration import Match, Verdict, match_maps
+from segmap.links import SIDE, Link, Pace, agreed, links_by_scan, pace_of, placed_from, steps_between, voted
+from segmap.parameters import Parameters
+from segmap.scans import ScanId
+from segmap.segments import SegmentMap
+from segmap.spreading import Matches, Pair, spread
+from segmap.visibility import Sighting, sighting, thinned
+
+__all__ = ["Chain", "chained", "keyframes", "windows"]
+
+STRETCH = 120
+"""scans that are tracked in one go; stretches are independent of each other"""
+WINDOW = 3
+"""keyframes before it that each keyframe is matched with"""
+HALVED = 3
+"""scans between two keyframes from which on one is put half-way"""
+RETURNS = 90
+"""returns of each scan that judge what is voted for"""
+SPARSE = 1.0 / 3.0
+"""where more than this share of the scans would be keyframes, all are"""
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """The keyframes of a log, and what holds them together in order."""
+
+    keys: tuple[ScanId, ...]
+    links: dict[Pair, Link]
+    """between keyframes"""
+    tracked: dict[ScanId, Link]
+    """every other scan, in the frame of the keyframe it was tracked from"""
+    matches: Matches
+    """every pair INTEGRATE was called on"""
+    pace: Pace
+    """of the log"""
+
+
+def chained(
+    maps: Mapping[ScanId, SegmentMap],
+    sequence: Sequence[ScanId],
+    parameters: Parameters,
+    *,
+    workers: int = 1,
+    progress: Callable[[str, int, int], None] | None = None,
+    check: Callable[[], None] | None = None,
+) -> Chain:
+    """The chain of a log: keyframes, their links, and the other scans tracked from them."""
+    told = progress or _nobody
+    firm, tracked, matches = _tracked(maps, sequence, parameters, workers, told, check)
+    keys = keyframes(sequence, firm)
+    tracked = {scan: link for scan, link in tracked.items() if scan not in set(keys)}
+    pairs = [pair for pair in windows(keys) if pair not in matches]
+    matches.update(
+        spread(
+            maps,
+            pairs,
+            parameters,
+            workers=workers,
+            progress=lambda i, n: told("matching keyframes", i, n),
+            check=check,
+        )
+    )
+    among = {pair: matches[pair] for pair in windows(keys)}
+    pace = pace_of(matches)
+    links = agreed(keys, among, pace)
+    _bridge(maps, keys, links, matches, pace, parameters, workers, check)
+    return Chain(tuple(keys), links, tracked, matches, pace)
+
+
+def _nobody(what: str, done: int, total: int) -> None:
+    """Nobody listens."""
+
+
+def windows(keys: Sequence[ScanId], width: int = WINDOW) -> Iterator[Pair]:
+    """Each keyframe with the few after it."""
+    return ((keys[i], keys[i + step]) for step in range(1, width + 1) for i in range(len(keys) - step))
+
+
+# --- tracking -------------------------------------------------------------------------------------
+
+
+def keyframes(sequence: Sequence[ScanId], firm: Sequence[ScanId]) -> list[ScanId]:
+    """The scans that others were tracked from, the last scan, and one half-way between those far apart.
+
+    Where these are many, all scans: their log is no denser than it has to be.
+    """
+    place = {scan: i for i, scan in enumerate(sequence)}
+    places = sorted({*(place[scan] for scan in firm), len(sequence) - 1}) if sequence else []
+    half = [a + (b - a) // 2 for a, b in pairwise(places) if b - a >= HALVED]
+    kept = sorted({*places, *half})
+    return list(sequence) if len(kept) > SPARSE * len(sequence) else [sequence[i] for i in kept]
+
+
+def _tracked(
+    maps: Mapping[ScanId, SegmentMap],
+    sequence: Sequence[ScanId],
+    parameters: Parameters,
+    workers: int,
+    told: Callable[[str, int, int], None],
+    check: Callable[[], None] | None,
+) -> tuple[list[ScanId], dict[ScanId, Link], Matches]:
+    """The scans others are tracked from, and every other one from the last of them."""
+    stretches = [sequence[i : i + STRETCH] for i in range(0, len(sequence), STRETCH)]
+    firm: list[ScanId] = []
+    tracked: dict[ScanId, Link] = {}
+    matches: Matches = {}
+    tasks = (delayed(_track)({scan: maps[scan] for scan in part}, part, parameters) for part in stretches)
+    results = Parallel(n_jobs=workers, return_as="generator", batch_size=1)(tasks)
+    for done, (keys, links, found) in enumerate(results, start=1):
+        if check is not None:
+            check()
+        firm.extend(keys)
+        tracked.update(links)
+        matches.update(found)
+        told("tracking", min(done * STRETCH, len(sequence)), len(sequence))
+    return firm, tracked, matches
+
+
+def _track(
+    maps: Mapping[ScanId, SegmentMap], part: Sequence[ScanId], parameters: Parameters
+) -> tuple[list[ScanId], dict[ScanId, Link], Matches]:
+    links: dict[ScanId, Link] = {}
+    matches: Matches = {}
+    keys, key = [part[0]], 0
+    for i in range(1, len(part)):
+        found = _sure(maps, part, key, i, parameters, matches)
+        if found is None and i - 1 > key:
+            key = i - 1
+            keys.append(part[key])
+            found = _sure(maps, part, key, i, parameters, matches)
+        if found is None:
+            key = i
+            keys.append(part[key])
+        else:
+            links[part[i]] = found
+    return keys, links, matches
+
+
+def _sure(
+    maps: Mapping[ScanId, SegmentMap],
+    part: Sequence[ScanId],
+    key: int,
+    i: int,
+    parameters: Parameters,
+    matches: Matches,
+) -> Link | None:
+    pair = part[key], part[i]
+    match: Match = match_maps(maps[pair[0]], maps[pair[1]], parameters, mode="verified")
+    matches[pair] = match
+    return Link.of(pair, match, 0, "accepted") if match.verdict is Verdict.ACCEPTED else None
+
+
+# --- gaps -----------------------------------------------------------------------------------------
+
+
+def _bridge(
+    maps: Mapping[ScanId, SegmentMap],
+    keys: Sequence[ScanId],
+    links: dict[Pair, Link],
+    matches: Matches,
+    pace: Pace,
+    parameters: Parameters,
+    workers: int,
+    check: Callable[[], None] | None,
+) -> None:
+    """Let the scans on both sides of each gap vote on the step across it."""
+    for i in range(1, len(keys)):
+        near = links_by_scan(links.values())
+        around = keys[max(0, i - 2 * SIDE) : i + 2 * SIDE]
+        if keys[i] in placed_from(keys[i - 1], near, around):
+            continue
+        before = placed_from(keys[i - 1], near, keys[max(0, i - SIDE) : i])
+        after = placed_from(keys[i], near, keys[i : i + SIDE])
+        pairs = [(a, b) for a in before for b in after if (a, b) not in matches]
+        matches.update(spread(maps, pairs, parameters, workers=workers, check=check))
+        steps = steps_between((keys[i - 1], keys[i]))
+        seen = _sightings(maps, (*before, *after))
+        consensus = voted(before, after, matches, seen, parameters, lambda T, steps=steps: pace.allows(T, steps))
+        if consensus is not None and consensus.clear:
+            for vote in consensus.votes:
+                links[vote.pair] = Link.of(vote.pair, matches[vote.pair], vote.rank, "voted")
+
+
+def _sightings(maps: Mapping[ScanId, SegmentMap], scans: Iterable[ScanId]) -> dict[ScanId, Sighting]:
+    """What scans saw, those that saw something."""
+    return {scan: thinned(seen, RETURNS) for scan in scans if (seen := sighting(maps[scan])) is not None}

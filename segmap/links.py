@@ -1,0 +1,393 @@
+"""Matches of the scans of a log -> links: candidates taken for true because several pairs say the same.
+
+A verdict looks at one pair. A log has more to say, without any pose: scans that follow each other are near
+each other (the log's own pace), three scans must close a triangle, and where single pairs are doubtful many of
+them may still agree on one transformation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from segmap.graph import Covariance, Edge
+from segmap.integration import Candidate, Match, Verdict
+from segmap.parameters import Parameters
+from segmap.pose import Pose2
+from segmap.refinement import refined
+from segmap.scans import ScanId
+from segmap.spreading import Pair
+from segmap.verdict import confidence, findings
+from segmap.visibility import Sighting, look
+
+__all__ = [
+    "Consensus",
+    "Link",
+    "Pace",
+    "agreed",
+    "confidence_among",
+    "links_by_scan",
+    "pace_of",
+    "placed_from",
+    "steps_between",
+    "voted",
+]
+
+FLOOR = 0.02, math.radians(0.4)
+"""metres and radians: no pair is known better, whatever its geometry says"""
+DOUBT = 2.0
+"""by this factor the variances of a match are taken larger than its geometry says: returns are not independent"""
+CLOSE = 0.3, math.radians(4.0)
+"""metres and radians; ways through other scans that agree to this say the same"""
+SIDE = 6
+"""scans on each side of a gap that may vote"""
+CANDIDATES = 8
+"""candidates of a pair that may be right although they are not the best"""
+LEAST_CONFIDENCE = 0.02
+"""a candidate less likely than this is not saved by a triangle"""
+PACED_CONFIDENCE = 0.9
+"""a candidate that is the only one in pace needs this much"""
+PACED_LEAD = 0.2
+"""and this share of its score as its lead over the next one in pace"""
+LEAST_VOTES, LEAST_SCORE, RIVAL = 2, 6.0, 0.85
+"""pairs that must agree, the metres all must score together, and the share of it the best rival may have"""
+MOST_CENTRES = 60
+"""votes that are tried as the middle of a cluster"""
+MOST_JUDGED = 10
+"""clusters that are judged by lines of sight"""
+JOINT_STEPS, JOINT_GATES = 4, (0.3, 0.1)
+"""steps of refinement of each pair, and the gates in metres it begins and ends with"""
+PACE_PERCENTILE, PACE_FACTOR, PACE_SLACK = 98.0, 1.5, (0.2, math.radians(5.0))
+
+
+@dataclass(frozen=True)
+class Link:
+    """One candidate of a pair, taken for true."""
+
+    first: ScanId
+    second: ScanId
+    T_1_2: Pose2
+    covariance: Covariance
+    """of x, y (metres) and theta (radians), as the pose graph takes it"""
+    why: str
+    """``accepted`` by its verdict; ``paced``, ``agreed``, ``voted``: see above; ``closed``, ``joined``: a loop;
+    ``tracked``: a scan between keyframes"""
+    confidence: float
+    rank: int = 0
+    """of the candidate among those of its match"""
+
+    @property
+    def pair(self) -> Pair:
+        """Its scans."""
+        return self.first, self.second
+
+    @property
+    def edge(self) -> Edge:
+        """This link in a pose graph."""
+        return Edge(self.first, self.second, self.T_1_2, self.covariance)
+
+    @classmethod
+    def of(cls, pair: Pair, match: Match, rank: int, why: str) -> Link:
+        """A candidate of a match as a link."""
+        candidate = match.ranked[rank]
+        return cls(*pair, candidate.T_1_2, covariance_of(candidate), why, match.confidence or 0.0, rank)
+
+
+def covariance_of(candidate: Candidate) -> Covariance:
+    """How well a verified candidate is known, as an edge of a pose graph."""
+    found = candidate.uncertainty
+    geometry = np.zeros((3, 3)) if found is None else np.array(found.covariance)
+    floor = np.diag([FLOOR[0] ** 2, FLOOR[0] ** 2, FLOOR[1] ** 2])
+    a, b, c = ((float(x), float(y), float(z)) for x, y, z in DOUBT * geometry + floor)
+    return a, b, c
+
+
+# --- the pace of a log ----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How far a robot goes between two scans of its log, at most."""
+
+    distance: float
+    """metres"""
+    turn: float
+    """radians"""
+
+    def allows(self, T_1_2: Pose2, steps: int = 1) -> bool:
+        """Whether so many steps can lead there."""
+        return math.hypot(T_1_2.x, T_1_2.y) <= steps * self.distance and abs(T_1_2.theta) <= steps * self.turn
+
+
+def pace_of(matches: Mapping[Pair, Match]) -> Pace:
+    """The pace of a log, from its accepted matches of scans that follow each other; unbounded where none is."""
+    steps = [m.T_1_2 for pair, m in matches.items() if steps_between(pair) == 1 and _accepted(m) and m.T_1_2]
+    if not steps:
+        return Pace(math.inf, math.inf)
+    far = np.percentile([math.hypot(T.x, T.y) for T in steps], PACE_PERCENTILE)
+    turn = np.percentile([abs(T.theta) for T in steps], PACE_PERCENTILE)
+    return Pace(float(PACE_FACTOR * far + PACE_SLACK[0]), float(PACE_FACTOR * turn + PACE_SLACK[1]))
+
+
+def steps_between(pair: Pair) -> int:
+    """How many scans on the second of two scans of a log was taken."""
+    return abs(pair[1].scan - pair[0].scan)
+
+
+def confidence_among(candidates: Sequence[Candidate]) -> float:
+    """The confidence in the first of some candidates of a match, had there been no others."""
+    judged = [(c.score, c.evidence) for c in candidates if c.score is not None and c.evidence is not None]
+    if not judged or candidates[0].uncertainty is None:
+        return 0.0
+    return confidence(findings(judged, candidates[0].uncertainty.weakest))
+
+
+def _accepted(match: Match) -> bool:
+    return match.verdict is Verdict.ACCEPTED
+
+
+# --- what a window of matches agrees on -----------------------------------------------------------
+
+
+def agreed(sequence: Sequence[ScanId], matches: Mapping[Pair, Match], pace: Pace) -> dict[Pair, Link]:
+    """The links of a sequence of scans of a log, from matches of scans that are near each other in it.
+
+    What is accepted and in pace; consecutive scans of which one candidate alone is in pace; then whatever
+    closes a triangle with two links; and without what most others contradict.
+    """
+    links = {
+        pair: Link.of(pair, match, 0, "accepted")
+        for pair, match in matches.items()
+        if _accepted(match) and pace.allows(match.ranked[0].T_1_2, steps_between(pair))
+    }
+    links.update(
+        (pair, link) for pair in pairwise(sequence) if pair not in links and (link := _paced(pair, matches, pace))
+    )
+    _close_triangles(links, matches)
+    return _outvoted(sequence, links)
+
+
+def _paced(pair: Pair, matches: Mapping[Pair, Match], pace: Pace) -> Link | None:
+    """The link of two consecutive scans of which one candidate in pace is clearly ahead of all others in pace."""
+    match = matches.get(pair)
+    ranked, steps = match.ranked if match else (), steps_between(pair)
+    within = [(rank, c) for rank, c in enumerate(ranked) if pace.allows(c.T_1_2, steps)]
+    if match is None or not within or confidence_among([c for _, c in within]) < PACED_CONFIDENCE:
+        return None
+    scores = [c.score or 0.0 for _, c in within]
+    if len(scores) > 1 and scores[0] - scores[1] < PACED_LEAD * scores[0]:
+        return None
+    return Link.of(pair, match, within[0][0], "paced")
+
+
+def _close_triangles(links: dict[Pair, Link], matches: Mapping[Pair, Match]) -> None:
+    """Take each candidate that two links already lead to, until no more is found."""
+    near = links_by_scan(links.values())
+    waiting = [pair for pair in matches if pair not in links]
+    found = True
+    while found:
+        found = False
+        for pair in list(waiting):
+            if link := _closing(pair, matches[pair], near):
+                links[pair] = link
+                near.setdefault(pair[0], {})[pair[1]] = link.T_1_2
+                near.setdefault(pair[1], {})[pair[0]] = link.T_1_2.inverse()
+                waiting.remove(pair)
+                found = True
+
+
+Near = dict[ScanId, dict[ScanId, Pose2]]
+"""``T_a_b`` of the scans b linked with each scan a"""
+
+
+def links_by_scan(links: Iterable[Link]) -> Near:
+    """For each scan, where the scans linked with it are in its frame."""
+    near: Near = {}
+    for link in links:
+        near.setdefault(link.first, {})[link.second] = link.T_1_2
+        near.setdefault(link.second, {})[link.first] = link.T_1_2.inverse()
+    return near
+
+
+def _closing(pair: Pair, match: Match, near: Near) -> Link | None:
+    a, b = pair
+    ways = [near[a][m] @ near[m][b] for m in near.get(a, {}) if b in near.get(m, {})]
+    if not ways:
+        return None
+    for rank, candidate in enumerate(match.ranked[:CANDIDATES]):
+        if any(_same(candidate.T_1_2, way) for way in ways) and confidence_among([candidate]) >= LEAST_CONFIDENCE:
+            return Link.of(pair, match, rank, "agreed")
+    return None
+
+
+def _same(T: Pose2, other: Pose2) -> bool:
+    distance, turn = T.distance(other)
+    return distance <= CLOSE[0] and turn <= CLOSE[1]
+
+
+# --- votes ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Vote:
+    """What one candidate says of the transformation between two groups of scans."""
+
+    weight: float
+    T_1_2: Pose2
+    pair: Pair
+    rank: int
+
+
+def placed_from(start: ScanId, near: Near, among: Iterable[ScanId]) -> dict[ScanId, Pose2]:
+    """Where scans are in the frame of one of them, by the fewest links that lead there within ``among``."""
+    wanted = set(among)
+    poses, waiting = {start: Pose2.identity()}, deque([start])
+    while waiting:
+        scan = waiting.popleft()
+        for other, T in near.get(scan, {}).items():
+            if other in wanted and other not in poses:
+                poses[other] = poses[scan] @ T
+                waiting.append(other)
+    return poses
+
+
+@dataclass(frozen=True)
+class Consensus:
+    """The transformation between two groups of scans that their pairs agree on best."""
+
+    T_1_2: Pose2
+    votes: tuple[Vote, ...]
+    """one of each pair that agrees"""
+    needed: int
+    """pairs that must agree: fewer where a group is a single scan"""
+    score: float
+    """metres: what the lines of sight of all pairs say of it, support less conflict"""
+    rival: float
+    """metres: the same of the best distinct other transformation"""
+
+    @property
+    def clear(self) -> bool:
+        """Whether enough speaks for it, and for nothing else."""
+        return len(self.votes) >= self.needed and self.score >= LEAST_SCORE and self.rival <= RIVAL * self.score
+
+
+def voted(
+    group_1: Mapping[ScanId, Pose2],
+    group_2: Mapping[ScanId, Pose2],
+    matches: Mapping[Pair, Match],
+    seen: Mapping[ScanId, Sighting],
+    parameters: Parameters,
+    allowed: Callable[[Pose2], bool] = lambda _: True,
+) -> Consensus | None:
+    """The transformation between two groups of scans that most of their pairs agree on; None where there is none.
+
+    Groups are given by the poses of their scans in a frame of each. Each pair votes for what each of its
+    candidates implies, where that is ``allowed``; what has most votes is judged by the lines of sight of all
+    pairs, also those that voted for something else.
+    """
+    votes = sorted(_votes(group_1, group_2, matches, allowed), key=lambda vote: -vote.weight)
+    clusters: list[tuple[float, Pose2, tuple[Vote, ...]]] = []
+    for vote in votes[:MOST_CENTRES]:
+        if not any(_same(vote.T_1_2, centre) for _, centre, _ in clusters):
+            agreeing = _one_each(other for other in votes if _same(other.T_1_2, vote.T_1_2))
+            clusters.append((sum(other.weight for other in agreeing), vote.T_1_2, agreeing))
+    clusters.sort(key=lambda cluster: -cluster[0])
+    needed = min(LEAST_VOTES, len(group_1), len(group_2))
+    judged = [
+        Consensus(T_1_2, agreeing, needed, _joint_score(group_1, group_2, T_1_2, seen, parameters), 0.0)
+        for _, T_1_2, agreeing in clusters[:MOST_JUDGED]
+    ]
+    if not judged:
+        return None
+    best = max(judged, key=lambda consensus: consensus.score)
+    rivals = [other.score for other in judged if not _nearly(other.T_1_2, best.T_1_2)]
+    return replace(best, rival=max(rivals, default=0.0))
+
+
+def _joint_score(
+    group_1: Mapping[ScanId, Pose2],
+    group_2: Mapping[ScanId, Pose2],
+    T_1_2: Pose2,
+    seen: Mapping[ScanId, Sighting],
+    parameters: Parameters,
+) -> float:
+    """What the lines of sight of all pairs say of a transformation between their groups, metres."""
+    weights = np.array((1.0, -parameters.conflict_weight, -parameters.shadow_weight, 0.0))  # pairs may be far apart
+    total = 0.0
+    for a, T_1_a in group_1.items():
+        for b, T_2_b in group_2.items():
+            pose = np.array([tuple(T_1_a.inverse() @ T_1_2 @ T_2_b)])
+            pose = refined(seen[a], seen[b], pose, JOINT_STEPS, *JOINT_GATES)
+            total += float(look(seen[a], seen[b], pose, parameters)[0] @ weights)
+    return total
+
+
+def _nearly(T: Pose2, other: Pose2) -> bool:
+    distance, turn = T.distance(other)
+    return distance <= 2.0 * CLOSE[0] and turn <= 2.0 * CLOSE[1]
+
+
+def _votes(
+    group_1: Mapping[ScanId, Pose2],
+    group_2: Mapping[ScanId, Pose2],
+    matches: Mapping[Pair, Match],
+    allowed: Callable[[Pose2], bool],
+) -> Iterator[Vote]:
+    for a, T_1_a in group_1.items():
+        for b, T_2_b in group_2.items():
+            match = matches.get((a, b))
+            for rank, candidate in enumerate(match.ranked[:CANDIDATES] if match else ()):
+                T_1_2 = T_1_a @ candidate.T_1_2 @ T_2_b.inverse()
+                if allowed(T_1_2):
+                    yield Vote(max(0.0, candidate.score or 0.0), T_1_2, (a, b), rank)
+
+
+def _one_each(votes: Iterable[Vote]) -> tuple[Vote, ...]:
+    """The strongest vote of each pair."""
+    kept: dict[Pair, Vote] = {}
+    for vote in votes:
+        kept.setdefault(vote.pair, vote)
+    return tuple(kept.values())
+
+
+def _outvoted(sequence: Sequence[ScanId], links: dict[Pair, Link]) -> dict[Pair, Link]:
+    """The links without those that the others across the same step contradict."""
+    place = {scan: i for i, scan in enumerate(sequence)}
+    across: dict[int, list[Link]] = {}
+    for link in links.values():
+        for step in range(place[link.first], place[link.second]):
+            across.setdefault(step, []).append(link)
+    wrong: set[Pair] = set()
+    for step, those in sorted(across.items()):
+        wrong.update(_contradicted(sequence, step, [link for link in those if link.pair not in wrong], links))
+    return {pair: link for pair, link in links.items() if pair not in wrong}
+
+
+def _contradicted(
+    sequence: Sequence[ScanId], step: int, those: Sequence[Link], links: Mapping[Pair, Link]
+) -> Iterator[Pair]:
+    """Of the links across a step those that disagree with what more of them say."""
+    near = links_by_scan(link for link in links.values() if link not in those)
+    before = placed_from(sequence[step], near, sequence[max(0, step - SIDE) : step + 1])
+    after = placed_from(sequence[step + 1], near, sequence[step + 1 : step + 1 + SIDE])
+    said = [
+        (link, before[link.first] @ link.T_1_2 @ after[link.second].inverse(), _weight(link))
+        for link in those
+        if link.first in before and link.second in after
+    ]
+    support = [sum(w for _, other, w in said if _nearly(T, other)) for _, T, _ in said]
+    if not said:
+        return
+    winner = max(range(len(said)), key=lambda k: support[k])
+    for k, (link, T, _) in enumerate(said):
+        if not _nearly(T, said[winner][1]) and support[k] < support[winner]:
+            yield link.pair
+
+
+def _weight(link: Link) -> float:
+    return 1.0 if link.why == "accepted" else 0.3

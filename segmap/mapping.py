@@ -1,0 +1,196 @@
+"""Whole logs -> whole maps, without odometry: keyframes, links, loop closures, one consistent set of poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby, product
+
+import numpy as np
+
+from segmap.graph import Optimised, optimise
+from segmap.keyframes import Chain, chained
+from segmap.links import Link, Pace
+from segmap.loops import AGREE, Scene, across, borne_out, closure, in_pace, promising, proposals
+from segmap.parameters import Parameters
+from segmap.pose import Pose2
+from segmap.scans import ScanId
+from segmap.segments import SegmentMap
+from segmap.spreading import Matches, Pair, spread
+
+__all__ = ["WholeMap", "map_scans"]
+
+ROUNDS = 3
+"""searches for closures, each from the poses the one before gave"""
+MOST_JOINING = 800
+"""pairs that are matched between two components"""
+LEAST_JOINING = 3
+"""scans a component has that is looked for in others"""
+BATCH = 48
+"""pairs that are matched before it is looked whether enough agree"""
+
+
+@dataclass(frozen=True, eq=False)
+class WholeMap:
+    """What was made of some logs: where every scan is, and by which links."""
+
+    optimised: Optimised
+    """poses of all scans that anything holds, by component"""
+    links: tuple[Link, ...]
+    """in the order of ``optimised.residuals``"""
+    keys: tuple[ScanId, ...]
+    """the keyframes"""
+    matches: Matches
+    """every pair INTEGRATE was called on"""
+    scans: tuple[ScanId, ...]
+    """all scans, also those that nothing holds"""
+
+    @property
+    def poses(self) -> Mapping[ScanId, Pose2]:
+        """Of every placed scan, in the frame of the first scan of its component."""
+        return self.optimised.poses
+
+    @property
+    def components(self) -> tuple[tuple[ScanId, ...], ...]:
+        """The scans that hold together, the largest component first."""
+        return tuple(sorted(self.optimised.components, key=lambda part: (-len(part), part)))
+
+
+Told = Callable[[str, int, int], None]
+
+
+def map_scans(
+    maps: Mapping[ScanId, SegmentMap],
+    parameters: Parameters,
+    *,
+    workers: int = 1,
+    progress: Told | None = None,
+    check: Callable[[], None] | None = None,
+) -> WholeMap:
+    """Where the scans of one log or several are, each log in the order it was taken.
+
+    Nothing but the scans is used. ``progress`` is told what is done, how much of it and of how much.
+
+    Raises:
+        CancelledError: raised by ``check``.
+    """
+    told: Told = progress or _nobody
+    chains = [
+        chained(maps, list(log), parameters, workers=workers, progress=told, check=check)
+        for _, log in groupby(sorted(maps), key=lambda scan: scan.log)
+    ]
+    paces = {chain.keys[0].log: chain.pace for chain in chains}
+    task = _Task(maps, parameters, workers, told, check, paces)
+    keys = sorted(key for chain in chains for key in chain.keys)
+    links = {pair: link for chain in chains for pair, link in chain.links.items()}
+    matches = {pair: match for chain in chains for pair, match in chain.matches.items()}
+    optimised = _close_loops(task, keys, links, matches)
+    every = [*links.values(), *_between(task, chains, optimised)]
+    final = optimise([link.edge for link in every], check=check)
+    return WholeMap(final, tuple(every), tuple(keys), matches, tuple(sorted(maps)))
+
+
+def _nobody(what: str, done: int, total: int) -> None:
+    """Nobody listens."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    maps: Mapping[ScanId, SegmentMap]
+    parameters: Parameters
+    workers: int
+    told: Told
+    check: Callable[[], None] | None
+    paces: Mapping[int, Pace]
+
+    def spread(self, pairs: Sequence[Pair], what: str) -> Matches:
+        """The matches of some pairs."""
+        told = self.told
+        return dict(
+            spread(
+                self.maps,
+                pairs,
+                self.parameters,
+                workers=self.workers,
+                progress=lambda done, total: told(what, done, total),
+                check=self.check,
+            )
+        )
+
+
+def _close_loops(task: _Task, keys: Sequence[ScanId], links: dict[Pair, Link], matches: Matches) -> Optimised:
+    """Search for closures within and between components until no more is found; ``links`` and ``matches`` grow."""
+    scene = Scene(task.maps, keys, task.parameters)
+    optimised = optimise([link.edge for link in links.values()], check=task.check)
+    for turn in range(ROUNDS):
+        promises = promising(scene, optimised.poses, optimised.components, _sound(optimised, links), set(matches))
+        found = task.spread([promise.pair for promise in promises], f"closing loops, round {turn + 1}")
+        matches.update(found)
+        closures = [link for promise in promises if (link := closure(promise, found[promise.pair]))]
+        links.update((link.pair, link) for link in closures)
+        joined = _join(task, scene, optimised, matches)
+        links.update((link.pair, link) for link in joined)
+        if not closures and not joined:
+            break
+        optimised = optimise([link.edge for link in links.values()], check=task.check)
+    return optimised
+
+
+def _sound(optimised: Optimised, links: Mapping[Pair, Link]) -> list[Link]:
+    """The links the optimiser does not silence."""
+    return [link for link, fate in zip(links.values(), optimised.residuals, strict=True) if not fate.silenced]
+
+
+def _join(task: _Task, scene: Scene, optimised: Optimised, matches: Matches) -> list[Link]:
+    """Closures between components: each two are searched until a proposal is borne out."""
+    parts = [part for part in optimised.components if len(part) >= LEAST_JOINING]
+    return [
+        link
+        for i, part in enumerate(parts)
+        for other in parts[i + 1 :]
+        for link in _joined(task, scene, optimised.poses, part, other, matches)
+    ]
+
+
+def _joined(
+    task: _Task,
+    scene: Scene,
+    poses: Mapping[ScanId, Pose2],
+    part: Sequence[ScanId],
+    other: Sequence[ScanId],
+    matches: Matches,
+) -> list[Link]:
+    waiting = [pair for pair in _across(task.maps, part, other) if pair not in matches]
+    asked: list[Pose2] = []
+    while True:
+        for T_1_2 in proposals(poses, part, other, matches):
+            if not any(T_1_2.distance(before)[0] < AGREE[0] for before in asked):
+                asked.append(T_1_2)
+                if not in_pace(poses, part, other, T_1_2, task.paces):
+                    continue
+                promises = across(scene, poses, part, other, T_1_2)
+                new = [promise.pair for promise in promises if promise.pair not in matches]
+                matches.update(task.spread(new, "joining components"))
+                if links := borne_out(promises, matches):
+                    return links
+        if not waiting:
+            return []
+        matches.update(task.spread(waiting[:BATCH], "joining components"))
+        del waiting[:BATCH]
+
+
+def _across(maps: Mapping[ScanId, SegmentMap], part: Sequence[ScanId], other: Sequence[ScanId]) -> list[Pair]:
+    """Pairs of scans of two components, evenly taken, those that saw most first."""
+    stride = max(1, int(np.ceil(np.sqrt(len(part) * len(other) / MOST_JOINING))))
+    pairs = [(min(a, b), max(a, b)) for a, b in product(part[::stride], other[::stride])]
+    return sorted(pairs, key=lambda pair: -min(_length(maps[pair[0]]), _length(maps[pair[1]])))
+
+
+def _length(segment_map: SegmentMap) -> float:
+    starts, ends = segment_map.coordinates[:, :2], segment_map.coordinates[:, 2:]
+    return float(np.hypot(*(ends - starts).T).sum())
+
+
+def _between(task: _Task, chains: Iterable[Chain], optimised: Optimised) -> list[Link]:
+    """The links of all scans that are no keyframes."""
+    return [replace(link, why="tracked") for chain in chains for link in chain.tracked.values()]
