@@ -54,6 +54,7 @@ ORDER = (
     "simulate",
     "export",
     "relations",
+    "relations",
     "benchmark",
     "pair_pictures",
     "datasets",

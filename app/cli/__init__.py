@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from app.cli import benchmarking, inspecting, integrating, merging, projects, public_data
+from app.cli import benchmarking, evaluating, inspecting, integrating, merging, projects, public_data
 from app.resources import program_version
 from segmap.errors import SegmapError
 
@@ -39,6 +39,7 @@ cli.command()(projects.export)
 cli.command()(projects.replay)
 cli.add_typer(public_data.datasets)
 cli.add_typer(benchmarking.benchmark)
+cli.command()(evaluating.evaluate)
 cli.command()(projects.sample)
 
 

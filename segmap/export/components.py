@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol, TypeAlias
 
+from segmap.graph import Edge
 from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap, Source
@@ -56,6 +57,8 @@ class Content:
     """what the names of the files begin with"""
     resolution: float = RESOLUTION
     """metres, the side of a cell, for formats that are made of cells"""
+    edges: Sequence[Edge] = ()
+    """the accepted integrations with their covariances, for formats that hold a pose graph"""
 
     @cached_property
     def _by_first(self) -> Mapping[str, list[tuple[int, str, str]]]:

@@ -16,6 +16,7 @@ from segmap.logs.carmen import CARMEN
 from segmap.logs.dpslam import DP_SLAM
 from segmap.logs.mcap import MCAP
 from segmap.logs.no_return import LONGEST, SHORTEST, NoReturn, no_return
+from segmap.logs.pose_graphs import PoseGraphFile, holds_pose_graph, is_pose_graph, read_pose_graph
 from segmap.logs.ranges_csv import RANGES_CSV
 from segmap.logs.ranges_json import RANGES_JSON, RANGES_JSON_LINES
 from segmap.logs.records import Format, Problems, Record
@@ -34,12 +35,15 @@ __all__ = [
     "LogSource",
     "MapPart",
     "MapsFile",
+    "PoseGraphFile",
     "bag_in",
     "base_name",
     "holds_maps",
+    "holds_pose_graph",
     "read_log",
     "read_logs",
     "read_maps",
+    "read_pose_graph",
 ]
 
 FORMATS: tuple[Format, ...] = (
@@ -155,6 +159,8 @@ def _format_of(head: bytes, file: LogFile) -> Format:
         return format
     if is_maps(head):
         raise LogError(f"{file.name} holds segment maps, not laser scans: give it where maps are asked for.")
+    if is_pose_graph(head):
+        raise LogError(f"{file.name} holds a pose graph without laser scans: give the log it was made from.")
     for magic, packed in PACKED.items():
         if head.startswith(magic):
             raise LogError(f"{file.name} is {packed}: unpack it and give the log inside.")

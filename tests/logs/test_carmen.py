@@ -174,7 +174,7 @@ def test_no_scans():
 
 
 @pytest.mark.parametrize(
-    "content", [b"hello\nworld\n", b"VERTEX2 0 0 0 0\n", bytes(range(256)), b"\x89PNG\r\n\x1a\n" + bytes(64), b"FLASER"]
+    "content", [b"hello\nworld\n", b"VERTEX9 0 0 0 0\n", bytes(range(256)), b"\x89PNG\r\n\x1a\n" + bytes(64), b"FLASER"]
 )
 def test_no_log(content):
     """A file of another kind is refused in one sentence that says what was expected."""
