@@ -54,7 +54,6 @@ ORDER = (
     "simulate",
     "export",
     "relations",
-    "relations",
     "benchmark",
     "pair_pictures",
     "datasets",
