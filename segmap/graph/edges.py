@@ -62,8 +62,7 @@ class Edge:
         """The same evidence, told from the other scan's frame; it weighs exactly the same in a graph."""
         T_2_1 = self.T_1_2.inverse()
         turn = _turned(T_2_1.theta)
-        turn[:2, 2] = T_2_1.y, -T_2_1.x  # an error of theta moves the other origin sideways
-        turn[2, 2] = 1.0
+        turn[:2, 2] = -T_2_1.y, T_2_1.x  # an error of theta moves the other origin sideways
         covariance = turn @ np.array(self.covariance) @ turn.T
         return replace(self, first=self.second, second=self.first, T_1_2=T_2_1, covariance=_as_tuple(covariance))
 

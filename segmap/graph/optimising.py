@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
 from segmap.errors import GraphError
 from segmap.graph.arrays import EdgeArrays, gaps, residuals
+from segmap.graph.deciding import decided
 from segmap.graph.edges import Edge, components
-from segmap.graph.least_squares import STEPS, LeastSquares
-from segmap.graph.optimised import HALF, Iteration, Optimised, Residual
-from segmap.graph.robust import Minimise, Round, graduated, reconsidered, settled, truncated
+from segmap.graph.least_squares import LeastSquares
+from segmap.graph.optimised import Iteration, Optimised, Residual
+from segmap.graph.robust import Problem, Round, graduated
 from segmap.graph.start import first_poses
 from segmap.graph.with_gtsam import Gtsam
-from segmap.pose import FloatArray, IntArray, Pose2
+from segmap.pose import FloatArray, Pose2
 from segmap.scans import ScanId
 
 __all__ = ["BACKENDS", "GATE", "optimise"]
@@ -25,8 +27,6 @@ BACKENDS = ("auto", "scipy", "gtsam")
 """``auto`` is scipy: the same result whatever is installed, and the quicker of the two by far"""
 GATE = 5.0
 """standard deviations; of right edges with honest covariances one in 65,000 is farther off"""
-MANY = 0.05
-"""of the edges that can be silenced; where more are, the other road is tried too"""
 
 
 def optimise(
@@ -40,9 +40,10 @@ def optimise(
 ) -> Optimised:
     """The poses of the scans that edges join, each component on its own.
 
-    ``initial`` poses, in one frame, are where the search begins; without one a scan begins where the most
-    reliable edges put it. ``robust`` lets edges that are not trusted be silenced where they are farther off
-    than ``gate`` standard deviations; ``check`` is called between steps and raises to stop.
+    ``initial`` poses, in one frame, are where the search begins, and help it only: a better place found from
+    where the most reliable edges put the scans is preferred. ``robust`` lets edges that are not trusted be
+    silenced where they are farther off than ``gate`` standard deviations; ``check`` is called between steps
+    and raises to stop.
 
     Raises:
         GraphError: there is no such backend, or it is not installed.
@@ -79,9 +80,7 @@ class _Solution:
     rounds: list[Round]
 
 
-_Tell = Callable[[Round], None]
-_Check = Callable[[], None] | None
-_Solve = Callable[[EdgeArrays, FloatArray, IntArray, float, bool, _Tell, _Check], tuple[FloatArray, FloatArray]]
+_Solve: TypeAlias = Callable[[Problem, Callable[[], None] | None], tuple[FloatArray, FloatArray]]
 
 
 def _solved(
@@ -94,10 +93,16 @@ def _solved(
 ) -> _Solution:
     """One component."""
     arrays = EdgeArrays.of(edges, {scan: i for i, scan in enumerate(scans)})
-    free = np.array([i for i, edge in enumerate(edges) if gate is not None and not edge.trusted], np.int64)
-    start = first_poses(scans, edges, np.zeros(len(edges)), initial)
     rounds: list[Round] = []
-    poses, weights = solve(arrays, start, free, gate or np.inf, bool(initial), rounds.append, check)
+    starts = [first_poses(scans, edges, initial)] if any(scan in initial for scan in scans) else []
+    problem = Problem(
+        edges=arrays,
+        starts=(*starts, first_poses(scans, edges)),
+        free=np.array([i for i, edge in enumerate(edges) if gate is not None and not edge.trusted], np.int64),
+        gate=gate or np.inf,
+        tell=rounds.append,
+    )
+    poses, weights = solve(problem, check)
     placed = {scan: Pose2(*row) for scan, row in zip(scans, poses.tolist(), strict=True)}
     return _Solution(placed, _residuals(arrays, edges, poses, weights), rounds)
 
@@ -108,53 +113,14 @@ def _residuals(arrays: EdgeArrays, edges: Sequence[Edge], poses: FloatArray, wei
     return [Residual(edge, *map(float, row)) for edge, row in zip(edges, columns, strict=True)]
 
 
-def _with_scipy(
-    edges: EdgeArrays, poses: FloatArray, free: IntArray, gate: float, known: bool, tell: _Tell, check: _Check
-) -> tuple[FloatArray, FloatArray]:
-    minimise = LeastSquares(edges, len(poses), check).minimised
-
-    def begin(poses: FloatArray) -> FloatArray:
-        return graduated(edges, poses, free, gate, tell, minimise)
-
-    return _decided(edges, poses, free, gate, known, tell, minimise, begin)
+def _with_scipy(problem: Problem, check: Callable[[], None] | None) -> tuple[FloatArray, FloatArray]:
+    minimise = LeastSquares(problem.edges, len(problem.starts[0]), check).minimised
+    return decided(problem, minimise, lambda poses: graduated(problem, poses, minimise))
 
 
-def _with_gtsam(
-    edges: EdgeArrays, poses: FloatArray, free: IntArray, gate: float, known: bool, tell: _Tell, check: _Check
-) -> tuple[FloatArray, FloatArray]:
-    solver = Gtsam(edges, check)
-
-    def begin(poses: FloatArray) -> FloatArray:
-        return solver.graduated(poses, free, gate)
-
-    return _decided(edges, poses, free, gate, known, tell, solver.minimised, begin)
-
-
-def _decided(
-    edges: EdgeArrays,
-    poses: FloatArray,
-    free: IntArray,
-    gate: float,
-    known: bool,
-    tell: _Tell,
-    minimise: Minimise,
-    begin: Callable[[FloatArray], FloatArray],
-) -> tuple[FloatArray, FloatArray]:
-    """Poses and weights.
-
-    Graduated non-convexity can end in a place that is worse than the one it began from, where the first poses
-    are ``known`` to be good or much is wrong: then both are settled, and the smaller loss wins.
-    """
-    if not len(free):
-        poses = minimise(poses, np.ones(len(edges)), STEPS)
-        tell(Round(float(edges.squares(poses).sum()), 0, poses))
-        return poses, np.ones(len(edges))
-    results = [settled(edges, begin(poses), free, gate, tell, minimise)]
-    if known or (results[0][1] < HALF).sum() > MANY * len(free):
-        results.append(settled(edges, poses, free, gate, tell, minimise))
-    losses = [truncated(edges.squares(placed), gate, free) for placed, _ in results]
-    poses, weights = reconsidered(edges, *results[int(np.argmin(losses))], free, gate, tell, minimise)
-    return minimise(poses, weights, STEPS), weights
+def _with_gtsam(problem: Problem, check: Callable[[], None] | None) -> tuple[FloatArray, FloatArray]:
+    solver = Gtsam(problem.edges, check)
+    return decided(problem, solver.minimised, lambda poses: solver.graduated(poses, problem.free, problem.gate))
 
 
 _BACKENDS: Mapping[str, _Solve] = {"auto": _with_scipy, "scipy": _with_scipy, "gtsam": _with_gtsam}

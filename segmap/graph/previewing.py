@@ -18,7 +18,7 @@ from segmap.scans import ScanId
 
 __all__ = ["Preview", "Shift", "preview"]
 
-STILL = 1e-3
+STILL = 5e-3
 """metres, radians; a scan that moves less stays"""
 NAMED = 3
 """contradicted edges that are named"""
@@ -74,8 +74,9 @@ def preview(
     """
     before = before or optimise(edges, gate=gate, check=check)
     believed = replace(candidate, trusted=True)
-    after = optimise([*edges, believed], before.poses, gate=gate, check=check)
-    judged = optimise([*edges, replace(candidate, trusted=False)], before.poses, gate=gate, check=check)
+    initial = before.poses if _together(candidate, before) else None
+    after = optimise([*edges, believed], initial, gate=gate, check=check)
+    judged = optimise([*edges, replace(candidate, trusted=False)], initial, gate=gate, check=check)
     expected = _expected(candidate, before, judged.residuals[-1].weight)
     now_silent = zip(before.residuals, after.residuals[:-1], strict=True)
     contradicts = [new for old, new in now_silent if new.silenced and not old.silenced]
@@ -91,10 +92,14 @@ def preview(
     )
 
 
+def _together(candidate: Edge, before: Optimised) -> bool:
+    first, second = before.component_of(candidate.first), before.component_of(candidate.second)
+    return first is not None and first == second
+
+
 def _expected(candidate: Edge, before: Optimised, weight: float) -> Residual | None:
     """How far the candidate is from where the graph has its second scan, and how sure both are of that."""
-    first, second = before.component_of(candidate.first), before.component_of(candidate.second)
-    if first is None or first != second:
+    if not _together(candidate, before):
         return None
     T_1_2 = before.poses[candidate.first].inverse() @ before.poses[candidate.second]
     left = np.array(tuple(candidate.T_1_2)) - tuple(T_1_2)
@@ -119,18 +124,18 @@ def _sentences(shown: Preview) -> Iterator[str]:
     yield _agreement(shown)
     yield _motion(shown.shifts)
     if shown.contradicts:
-        yield f"Believed, it silences what was accepted before: {_named(shown.contradicts)}."
+        yield f"Accepting it silences what was accepted before: {_named(shown.contradicts)}."
     if shown.loop is not None:
         yield described_loop(shown.loop)
     if shown.silenced:
-        yield f"Accepted as one among others, {shown.candidate.name} would be silenced."
+        yield f"The optimiser would silence {shown.candidate.name} itself."
 
 
 def _motion(shifts: Sequence[Shift]) -> str:
     if not shifts:
-        return "Believed, it moves no scan."
+        return "Accepting it moves no scan."
     most, count = shifts[0], f"{len(shifts)} scans" if len(shifts) > 1 else "1 scan"
-    return f"Believed, it moves {count}, scan {most.scan} the farthest: {in_words(most.translation, most.rotation)}."
+    return f"Accepting it moves {count}, scan {most.scan} the farthest: {in_words(most.translation, most.rotation)}."
 
 
 def _named(residuals: Sequence[Residual]) -> str:

@@ -19,7 +19,7 @@ from segmap.graph.marginals import Marginals
 from segmap.graph.reattaching import reattached
 from segmap.pose import FloatArray, IntArray
 
-__all__ = ["Minimise", "Round", "graduated", "reconsidered", "settled", "truncated"]
+__all__ = ["Minimise", "Problem", "Round", "graduated", "reconsidered", "settled"]
 
 SHARPENING = 2.0
 """how much closer to its true form the loss comes each round; Yang et al. take 1.4, and more rounds, to the same end"""
@@ -53,22 +53,30 @@ class Round:
     """(n, 3)"""
 
 
-def truncated(squared: FloatArray, gate: float, free: IntArray) -> float:
-    """The loss: squares of edges, those of ``free`` ones cut at the gate."""
-    cut = squared.copy()
-    cut[free] = np.minimum(cut[free], gate**2)
-    return float(cut.sum())
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One component to be optimised."""
+
+    edges: EdgeArrays
+    starts: tuple[FloatArray, ...]
+    """poses (n, 3) to begin from; the last are those along the most reliable edges, those before were given"""
+    free: IntArray
+    """the edges that can be silenced"""
+    gate: float
+    """standard deviations"""
+    tell: Callable[[Round], None]
+    """is told of every round"""
+
+    def loss(self, poses: FloatArray) -> float:
+        """The sum of the squares of all edges, those of free ones cut at the gate."""
+        squared = self.edges.squares(poses)
+        squared[self.free] = np.minimum(squared[self.free], self.gate**2)
+        return float(squared.sum())
 
 
-def graduated(
-    edges: EdgeArrays,
-    poses: FloatArray,
-    free: IntArray,
-    gate: float,
-    tell: Callable[[Round], None],
-    minimise: Minimise,
-) -> FloatArray:
-    """Poses (n, 3) after the rounds, begun at some poses; ``free`` are the edges that can be silenced."""
+def graduated(problem: Problem, poses: FloatArray, minimise: Minimise) -> FloatArray:
+    """Poses (n, 3) after the rounds, begun at some poses."""
+    edges, free, gate = problem.edges, problem.free, problem.gate
     weights = np.ones(len(edges))
     poses = minimise(poses, weights, FIRST_STEPS)
     squared = edges.squares(poses)
@@ -77,7 +85,7 @@ def graduated(
         weights[free] = _weights(squared[free], gate, convexity)
         poses = minimise(poses, weights, 1)
         squared = edges.squares(poses)
-        tell(Round(truncated(squared, gate, free), int((weights < 0.5).sum()), poses))
+        problem.tell(Round(problem.loss(poses), int((weights < 0.5).sum()), poses))
         if (np.minimum(weights, 1.0 - weights) <= DECIDED).all():
             break
         convexity *= SHARPENING
@@ -97,18 +105,12 @@ def _weights(squared: FloatArray, gate: float, convexity: float) -> FloatArray:
     return np.where(squared <= inner, 1.0, np.where(squared >= outer, 0.0, between))
 
 
-def settled(
-    edges: EdgeArrays,
-    poses: FloatArray,
-    free: IntArray,
-    gate: float,
-    tell: Callable[[Round], None],
-    minimise: Minimise,
-) -> tuple[FloatArray, FloatArray]:
+def settled(problem: Problem, poses: FloatArray, minimise: Minimise) -> tuple[FloatArray, FloatArray]:
     """Poses and weights of 0 or 1 at which every free edge counts exactly if it is within the gate.
 
     Where silencing would cut a part off, an edge across the cut counts all the same.
     """
+    edges, free, gate = problem.edges, problem.free, problem.gate
     weights, best = np.full(len(edges), -1.0), np.inf
     result = poses, weights
     for _ in range(SETTLING):
@@ -119,36 +121,30 @@ def settled(
         if (new == weights).all():
             break
         weights, poses = new, minimise(poses, new, STEPS)
-        loss = truncated(edges.squares(poses), gate, free)
-        tell(Round(loss, int((new < 0.5).sum()), poses))
+        loss = problem.loss(poses)
+        problem.tell(Round(loss, int((new < 0.5).sum()), poses))
         if loss < best:
             best, result = loss, (poses, new)
     return result
 
 
 def reconsidered(
-    edges: EdgeArrays,
-    poses: FloatArray,
-    weights: FloatArray,
-    free: IntArray,
-    gate: float,
-    tell: Callable[[Round], None],
-    minimise: Minimise,
+    problem: Problem, poses: FloatArray, weights: FloatArray, minimise: Minimise
 ) -> tuple[FloatArray, FloatArray]:
     """Poses and weights after silenced edges got a second hearing.
 
     An edge can be beyond the gate only because the graph went without it. What it costs to let it count is
     its squared distance with the uncertainty of both, graph and edge; where that is within the gate, it counts.
     """
-    loss = truncated(edges.squares(poses), gate, free)
+    loss = problem.loss(poses)
     for _ in range(HEARINGS):
-        place = _wronged(edges, poses, weights, gate)
+        place = _wronged(problem.edges, poses, weights, problem.gate)
         if place is None:
             break
         again = weights.copy()
         again[place] = 1.0
-        result = settled(edges, minimise(poses, again, STEPS), free, gate, tell, minimise)
-        new_loss = truncated(edges.squares(result[0]), gate, free)
+        result = settled(problem, minimise(poses, again, STEPS), minimise)
+        new_loss = problem.loss(result[0])
         if new_loss >= loss:
             break
         loss, (poses, weights) = new_loss, result

@@ -23,19 +23,17 @@ def uncertainty(edge: Edge) -> float:
 
 
 def first_poses(
-    scans: Sequence[ScanId],
-    edges: Sequence[Edge],
-    support: FloatArray,
-    initial: Mapping[ScanId, Pose2],
+    scans: Sequence[ScanId], edges: Sequence[Edge], initial: Mapping[ScanId, Pose2] | None = None
 ) -> FloatArray:
     """Poses (n, 3) of the scans of one component in the frame of the first.
 
-    ``initial`` poses are taken; what lacks one is composed along a spanning tree: trusted edges first,
-    then by ``support`` (how much speaks for each edge, large is good), then the surest.
+    ``initial`` poses are taken; what lacks one is composed along a spanning tree: trusted edges first, then
+    the surest.
     """
+    initial = initial or {}
     places = {scan: place for place, scan in enumerate(scans)}
     links: list[list[tuple[int, Pose2]]] = [[] for _ in scans]
-    for edge in _tree(edges, places, support, initial):
+    for edge in _tree(edges, places, initial):
         a, b = places[edge.first], places[edge.second]
         links[a].append((b, edge.T_1_2))
         links[b].append((a, edge.T_1_2.inverse()))
@@ -44,18 +42,14 @@ def first_poses(
     return _in_first_frame(np.array([tuple(poses[place]) for place in range(len(scans))]))
 
 
-def _tree(
-    edges: Sequence[Edge], places: Mapping[ScanId, int], support: FloatArray, initial: Mapping[ScanId, Pose2]
-) -> list[Edge]:
+def _tree(edges: Sequence[Edge], places: Mapping[ScanId, int], initial: Mapping[ScanId, Pose2]) -> list[Edge]:
     """Edges that reach every scan from those with initial poses, without a loop."""
     parts = Parts(len(places))
     held = [places[scan] for scan in initial if scan in places]
     for place in held[1:]:
         parts.join(held[0], place)
-    order = sorted(
-        range(len(edges)), key=lambda i: (not edges[i].trusted, -float(support[i]), uncertainty(edges[i]), i)
-    )
-    return [edges[i] for i in order if parts.join(places[edges[i].first], places[edges[i].second])]
+    ordered = sorted(edges, key=lambda edge: (not edge.trusted, uncertainty(edge)))
+    return [edge for edge in ordered if parts.join(places[edge.first], places[edge.second])]
 
 
 def _spread(links: Sequence[Sequence[tuple[int, Pose2]]], held: Mapping[int, Pose2]) -> dict[int, Pose2]:
