@@ -49,7 +49,11 @@ def _to_version_1(connection: sqlite3.Connection) -> None:
             )
 
 
-MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (_to_version_1,)
+def _to_version_2(connection: sqlite3.Connection) -> None:
+    """Events may propose pairs and hold covariances: the tables stay, but older programs cannot replay such a file."""
+
+
+MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (_to_version_1, _to_version_2)
 """The function at place k takes a file of version k to version k + 1, inside a transaction."""
 
 

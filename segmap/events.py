@@ -1,5 +1,6 @@
 """What can happen to a project: its events, as they are written into its history.
 
+    Propose                pairs beyond neighbours are put into the review queue, any number in one step
     Decide, Clear          about integrations; any number of them is one step
     SetParameters,
     SetHeuristic, Rename   about the project
@@ -38,12 +39,15 @@ __all__ = [
     "AddLog",
     "Choice",
     "Clear",
+    "Covariance",
     "Create",
     "Decide",
     "Decision",
     "Event",
     "IntegrationId",
     "LogInfo",
+    "Proposal",
+    "Propose",
     "Redo",
     "Rename",
     "SetHeuristic",
@@ -104,6 +108,9 @@ def _storable(text: Any) -> Any:
 _Id: TypeAlias = Annotated[str, AfterValidator(_known)]
 _Name: TypeAlias = Annotated[str, Field(max_length=255), BeforeValidator(_storable)]
 _Text: TypeAlias = Annotated[str, Field(max_length=10_000), BeforeValidator(_storable)]
+_Three: TypeAlias = tuple[float, float, float]
+Covariance: TypeAlias = tuple[_Three, _Three, _Three]
+"""of x, y (metres) and theta (radians) of a ``T_1_2``"""
 
 
 class _Model(BaseModel):
@@ -158,6 +165,8 @@ class Choice(_Model):
     mode: _Name = ""
     candidate: int | None = Field(default=None, ge=0)
     """rank of the candidate, 0 for the best; None: not one of the ranked candidates"""
+    covariance: Covariance | None = None
+    """how well ``T_1_2`` is known, as the pose graph weighs it; None: nothing told"""
 
     @model_validator(mode="after")
     def _placed(self) -> Self:
@@ -165,8 +174,7 @@ class Choice(_Model):
             raise ProjectError(
                 f"{self.integration} cannot be accepted without a transformation: reject it, or choose one."
             )
-        if self.T_1_2 is not None and not all(abs(number) < float("inf") for number in self.T_1_2):
-            raise ProjectError(f"The transformation of {self.integration} is not finite.")
+        _refuse_unplaced(self.integration, self.T_1_2)
         return self
 
 
@@ -226,6 +234,37 @@ class AddLog(_Recorded):
 
     kind: Literal["add_log"] = "add_log"
     log: LogInfo
+
+
+class Proposal(_Model):
+    """A pair of scans that somebody, or a search, asks to be looked at."""
+
+    integration: _Id
+    kind: Literal["closure", "imported", "manual"]
+    """found by our own search, an edge of another program's pose graph, or asked for by hand"""
+    T_1_2: Pose2 | None = None
+    """where whoever proposes it says that scan 2 lies; None: says nothing"""
+    covariance: Covariance | None = None
+    """how well that is known"""
+    source: _Name = ""
+    """for people: the file it came from, or what found it"""
+
+    @model_validator(mode="after")
+    def _placed(self) -> Self:
+        _refuse_unplaced(self.integration, self.T_1_2)
+        return self
+
+
+class Propose(_Recorded):
+    """Pairs beside the neighbours of each log are put into the review queue, all in one step."""
+
+    kind: Literal["propose"] = "propose"
+    proposals: tuple[Proposal, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _once_each(self) -> Self:
+        _refuse_twice([proposal.integration for proposal in self.proposals])
+        return self
 
 
 class Decide(_Recorded):
@@ -289,7 +328,7 @@ class Rename(_Recorded):
     name: _Name
 
 
-Event: TypeAlias = Create | AddLog | Decide | Clear | Undo | Redo | SetParameters | SetHeuristic | Rename
+Event: TypeAlias = Create | AddLog | Propose | Decide | Clear | Undo | Redo | SetParameters | SetHeuristic | Rename
 
 _EVENT: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="kind")])
 
@@ -310,3 +349,8 @@ def _refuse_twice(integrations: Sequence[str]) -> None:
     if len(set(integrations)) < len(integrations):
         twice = next(name for i, name in enumerate(integrations) if name in integrations[:i])
         raise ProjectError(f"{twice} is named twice in one step: name each integration once.")
+
+
+def _refuse_unplaced(integration: str, T_1_2: Pose2 | None) -> None:
+    if T_1_2 is not None and not all(abs(number) < float("inf") for number in T_1_2):
+        raise ProjectError(f"The transformation of {integration} is not finite.")

@@ -28,6 +28,8 @@ from segmap.events import (
     Event,
     IntegrationId,
     LogInfo,
+    Proposal,
+    Propose,
     Redo,
     Rename,
     SetHeuristic,
@@ -51,6 +53,8 @@ __all__ = [
     "IntegrationId",
     "LogInfo",
     "ProjectState",
+    "Proposal",
+    "Propose",
     "Redo",
     "Rename",
     "SetHeuristic",
@@ -93,6 +97,7 @@ class Step:
     """in words, for buttons: ``accepted 12 integrations``"""
     decisions: _Change[Decision | None]
     settings: _Change[Any]
+    proposals: _Change[Proposal | None] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -108,6 +113,8 @@ class ProjectState:
     logs: tuple[LogInfo, ...] = ()
     decisions: Mapping[str, Decision] = field(default_factory=lambda: MappingProxyType({}))
     """the ones in force, by integration; an integration that is not here is undecided"""
+    proposals: Mapping[str, Proposal] = field(default_factory=lambda: MappingProxyType({}))
+    """pairs in the review queue beside the neighbours of each log, by integration"""
     parameter_sets: Mapping[str, Parameters] = field(
         default_factory=lambda: MappingProxyType({_DEFAULTS_NAME: _DEFAULTS})
     )
@@ -214,7 +221,7 @@ class _Draft:
         self.settings: dict[str, Any] = {name: getattr(state, name) for name in _SETTINGS}
         self.parameter_sets = dict(state.parameter_sets)
         self.logs = list(state.logs)
-        self.decisions = dict(state.decisions)
+        self.decisions, self.proposals = dict(state.decisions), dict(state.proposals)
         self.done, self.undone = list(state.done), list(state.undone)
         self.touched, self.turned = dict(state.touched), state.turned
         self.revision, self.modified = state.revision, state.modified
@@ -224,6 +231,7 @@ class _Draft:
             **self.settings,
             logs=tuple(self.logs),
             decisions=MappingProxyType(self.decisions),
+            proposals=MappingProxyType(self.proposals),
             parameter_sets=MappingProxyType(self.parameter_sets),
             revision=self.revision,
             modified=self.modified,
@@ -243,6 +251,9 @@ class _Draft:
                 self._create(event)
             case AddLog():
                 self.logs.append(event.log.model_copy(update={"index": len(self.logs), "event": self.revision}))
+            case Propose():
+                self._checked(proposal.integration for proposal in event.proposals)
+                self._step(event, {}, {}, {proposal.integration: proposal for proposal in event.proposals})
             case Decide():
                 self._decide(event)
             case Clear():
@@ -288,12 +299,20 @@ class _Draft:
             self.parameter_sets[event.fingerprint] = event.parameters
         self._step(event, {}, _settings(event))
 
-    def _step(self, event: Event, decisions: Mapping[str, Decision | None], settings: Mapping[str, Any]) -> None:
+    def _step(
+        self,
+        event: Event,
+        decisions: Mapping[str, Decision | None],
+        settings: Mapping[str, Any],
+        proposals: Mapping[str, Proposal] = MappingProxyType({}),
+    ) -> None:
         """Do what can be undone; what changes nothing is no step."""
-        changed = {name: (old, new) for name, new in decisions.items() if (old := self.decisions.get(name)) != new}
-        set_ = {name: (old, new) for name, new in settings.items() if (old := self.settings[name]) != new}
-        if changed or set_:
-            step = Step(self.revision, event.who, _described(changed, set_), changed, set_)
+        changed = _differences(self.decisions, decisions)
+        set_: _Change[Any] = _differences(self.settings, settings)
+        asked: _Change[Proposal | None] = _differences(self.proposals, proposals)
+        if changed or set_ or asked:
+            described = _described_proposals(asked) if asked else _described(changed, set_)
+            step = Step(self.revision, event.who, described, changed, set_, asked)
             self._put(step, 1, event.who)
             self.done.append(step)
             self.undone.clear()
@@ -312,8 +331,10 @@ class _Draft:
 
     def _put(self, step: Step, side: int, who: str, turn: str = "") -> None:
         """Bring the side of a step, 0 before or 1 after, into force."""
+        for name, proposal in step.proposals.items():
+            _put(self.proposals, name, proposal[side])
         for name, decision in step.decisions.items():
-            self._put_decision(name, decision[side])
+            _put(self.decisions, name, decision[side])
             what = step.description if turn else _described({name: decision}, {})
             self.touched[name] = Touch(self.revision, who, turn + what)
         for name, setting in step.settings.items():
@@ -321,11 +342,17 @@ class _Draft:
             self.touched[name] = Touch(self.revision, who, turn + step.description)
         self.turned = Touch(self.revision, who, turn + step.description)
 
-    def _put_decision(self, name: str, decision: Decision | None) -> None:
-        if decision is None:
-            del self.decisions[name]
-        else:
-            self.decisions[name] = decision
+
+def _differences(held: Mapping[str, _T], wanted: Mapping[str, _T | None]) -> _Change[_T | None]:
+    """What is to be another from here: before and after."""
+    return {name: (old, new) for name, new in wanted.items() if (old := held.get(name)) != new}
+
+
+def _put(held: dict[str, _T], name: str, value: _T | None) -> None:
+    if value is None:
+        del held[name]
+    else:
+        held[name] = value
 
 
 _SETTINGS = ("name", "parameters", "fingerprint", "heuristic", "mode")
@@ -348,6 +375,17 @@ def _described_decisions(decisions: _Change[Decision | None]) -> str:
     if len(decisions) == 1:
         return f"{next(iter(counts))} {next(iter(decisions))}"
     return " and ".join(f"{verb} {count}" for verb, count in sorted(counts.items())) + " integrations"
+
+
+_PROPOSED = {"closure": "loop closures", "imported": "imported edges", "manual": "pairs"}
+
+
+def _described_proposals(proposals: _Change[Proposal | None]) -> str:
+    """As in ``proposed 12 loop closures``, ``proposed 0.1-0.7``."""
+    kinds = {after.kind for _, after in proposals.values() if after}
+    if len(proposals) == 1:
+        return f"proposed {next(iter(proposals))}"
+    return f"proposed {len(proposals)} {_PROPOSED[kinds.pop()] if len(kinds) == 1 else 'pairs'}"
 
 
 def _described_parameters(before: Parameters, after: Parameters) -> str:

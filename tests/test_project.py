@@ -22,6 +22,8 @@ from segmap.project import (
     IntegrationId,
     LogInfo,
     ProjectState,
+    Proposal,
+    Propose,
     Redo,
     Rename,
     SetHeuristic,
@@ -38,6 +40,8 @@ from segmap.scans import ScanId
 
 SCANS = 8
 IDS = [f"0.{i}-0.{i + 1}" for i in range(SCANS - 1)]
+FAR = ["0.0-0.5", "0.1-0.7"]
+"""pairs that are no neighbours"""
 SOMEWHERE = Pose2(1.0, 2.0, 0.5)
 NUMBERS = st.floats(-1e6, 1e6)
 POSES = st.builds(Pose2, NUMBERS, NUMBERS, NUMBERS)
@@ -51,6 +55,11 @@ def choice(integration: str, verdict: str = "accepted", T_1_2: Pose2 | None = SO
     return Choice(integration=integration, verdict=verdict, T_1_2=T_1_2, parameters=fingerprint(Parameters()))
 
 
+def propose(*integrations: str, kind: str = "closure", T_1_2: Pose2 | None = None) -> Propose:
+    made = [Proposal(integration=name, kind=kind, T_1_2=T_1_2) for name in integrations]  # type: ignore[arg-type]
+    return Propose(proposals=tuple(made))
+
+
 def decide(*integrations: str, verdict: str = "accepted", who: str = "") -> Decide:
     return Decide(choices=tuple(choice(name, verdict) for name in integrations), who=who)
 
@@ -62,7 +71,8 @@ def project(*events: Event) -> ProjectState:
 
 def document(state: ProjectState) -> tuple[object, ...]:
     """What undo brings back."""
-    return state.name, state.parameters, state.fingerprint, state.heuristic, state.mode, dict(state.decisions)
+    settings = state.name, state.parameters, state.fingerprint, state.heuristic, state.mode
+    return *settings, dict(state.decisions), dict(state.proposals)
 
 
 class History(RuleBasedStateMachine):
@@ -100,6 +110,15 @@ class History(RuleBasedStateMachine):
     def clear(self, names: list[str]) -> None:
         self.step(Clear(integrations=tuple(names)))
         assert not set(names) & set(self.state.decisions)
+
+    @rule(
+        names=st.lists(st.sampled_from(IDS + FAR), min_size=1, unique=True),
+        kind=st.sampled_from(["closure", "imported", "manual"]),
+        T=st.none() | POSES,
+    )
+    def propose(self, names: list[str], kind: str, T: Pose2 | None) -> None:
+        self.step(propose(*names, kind=kind, T_1_2=T))
+        assert {self.state.proposals[name].kind for name in names} == {kind}
 
     @rule(threshold=st.sampled_from([3.0, 4.0, 5.0]))
     def set_parameters(self, threshold: float) -> None:
@@ -158,6 +177,35 @@ def test_a_batch_is_one_step() -> None:
     state = apply(state, Undo())
     assert list(state.decisions) == [IDS[0]]
     assert state.decisions[IDS[0]].verdict == "accepted"
+
+
+def test_proposals_are_one_step_told_in_words() -> None:
+    """A search, a file or a hand puts pairs into the queue; each is taken back at once."""
+    state = project(propose(*FAR), propose("0.2-0.6", kind="manual"))
+    assert set(state.proposals) == {*FAR, "0.2-0.6"}
+    assert state.can_undo == "proposed 0.2-0.6"
+    state = apply(state, Undo())
+    assert state.can_undo == "proposed 2 loop closures"
+    assert apply(state, Undo()).proposals == {}
+    assert apply(state, propose(*FAR)).can_undo == "proposed 2 loop closures"
+    assert len(apply(state, propose(*FAR)).done) == 1
+
+
+def test_a_pair_proposed_again_says_what_was_said_last() -> None:
+    """An imported edge gives a pair that was there a pose to compare with; undo brings back what was said before."""
+    state = project(propose(FAR[0]), propose(FAR[0], kind="imported", T_1_2=SOMEWHERE))
+    assert (state.proposals[FAR[0]].kind, state.proposals[FAR[0]].T_1_2) == ("imported", SOMEWHERE)
+    assert apply(state, Undo()).proposals[FAR[0]].kind == "closure"
+
+
+def test_a_proposal_of_scans_the_project_has_not_is_refused() -> None:
+    """As a decision on them is."""
+    with pytest.raises(ProjectError, match=r"no scan 0\.99"):
+        project(propose("0.0-0.99"))
+    with pytest.raises(ProjectError, match="named twice"):
+        propose(FAR[0], FAR[0])
+    with pytest.raises(ProjectError, match="not finite"):
+        propose(FAR[0], T_1_2=Pose2(math.inf, 0.0, 0.0))
 
 
 def test_nothing_can_be_redone_after_a_new_decision() -> None:

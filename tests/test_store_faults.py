@@ -20,7 +20,7 @@ from segmap import _database
 from segmap.errors import ProjectError
 from segmap.parameters import Parameters
 from segmap.pose import Pose2
-from segmap.project import Choice, Clear, Decide, Redo, Rename, SetHeuristic, SetParameters, Undo
+from segmap.project import Choice, Clear, Decide, Proposal, Propose, Redo, Rename, SetHeuristic, SetParameters, Undo
 from segmap.store import CHUNK, Store
 
 VERSION_1 = Path(__file__).parent / "projects" / "version-1.segmap"
@@ -332,7 +332,23 @@ def test_a_project_of_version_1_is_read_by_every_later_version(tmp_path: Path) -
         assert state.parameters.value_threshold == 3.5
         assert (state.can_undo, state.can_redo) == ("renamed the project to Office", "cleared 0.1-0.2")
         assert store.log_bytes(0) == b"FLASER 0\n" * 4
+        assert state.proposals == {}
+        assert state.decisions["0.0-0.1"].covariance is None
         assert store.append(decide(store, "0.2-0.3")).seq == 13
+
+
+def test_what_version_2_brought_older_programs_refuse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pairs can be proposed in a project of version 1 too; from then on a program of version 1 says to update."""
+    path = tmp_path / "v1.segmap"
+    shutil.copy(VERSION_1, path)
+    proposal = Proposal(integration="0.0-0.3", kind="imported", T_1_2=Pose2(1.0, 2.0, 0.5), source="graph.g2o")
+    with Store.open(path) as store:
+        store.append(Propose(proposals=(proposal,), who="Anna"))
+    with Store.open(path) as store:
+        assert store.state.proposals == {"0.0-0.3": proposal}
+        assert store.state.can_undo == "proposed 0.0-0.3"
+    monkeypatch.setattr(_database, "MIGRATIONS", _database.MIGRATIONS[:1])
+    refused(path, lambda: Store.open(path), "written by a newer segmap (version 2 of the project file")
 
 
 def write_version_1(path: Path) -> None:
