@@ -6,7 +6,7 @@ The pair benchmark has neighbours and pairs without a common wall. In between li
 ends of a corridor, two like rooms. Of each log N pairs (1000) of scans within 15 m of each other are drawn with a
 fixed seed and matched in verified mode at the shipped defaults; the truth are the log's own corrected poses. A pose
 is called wrong only when it is off by more than 0.5 m or 10 degrees, because such poses err too. Pairs whose
-logged pose is known to be wrong (scans 42 of csail) are not drawn. Printed: pairs, accepted and accepted wrongly by
+logged pose is known to be wrong (scans 42 and 364 of csail) are not drawn. Printed: pairs, accepted and accepted wrongly by
 log and distance, and every pair accepted wrongly.
 """
 
@@ -30,8 +30,9 @@ FARTHEST, STEP = 15.0, 3.0
 """metres between the sensors; and width of a row's range"""
 OFF_DISTANCE, OFF_ANGLE = 0.5, math.radians(10.0)
 """metres and radians; accepted poses farther off are wrong"""
-WRONG_POSES = {("csail", 42)}
-"""turned by 11 degrees: docs/failures.md"""
+WRONG_POSES = {("csail", 42), ("csail", 364)}
+"""turned by 11 degrees (docs/failures.md), and by 21: accepted matches of 364 with 361 to 363, 365 and 366 are all off
+by 20 to 24 degrees from the log, those among the others by less than 2"""
 
 
 @dataclass(frozen=True)
