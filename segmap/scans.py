@@ -14,10 +14,11 @@ from numpy.typing import ArrayLike
 from segmap.errors import ScanError
 from segmap.pose import FloatArray, IntArray, Pose2
 
-__all__ = ["LaserLog", "LaserScan", "LogProblem", "ScanId"]
+__all__ = ["MAX_BEAMS", "LaserLog", "LaserScan", "LogProblem", "ScanId"]
 
 ALL_ROUND = 2.0 * np.pi
 MAX_BEAMS = 100_000
+"""no laser has more"""
 FARTHEST = 10_000.0
 """metres; no laser scanner sees farther, a larger reading is an error in the file"""
 

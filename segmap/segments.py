@@ -23,7 +23,7 @@ LEAST_LENGTH = 1e-9
 FARTHEST = 1e8
 """metres; no map reaches farther from its origin"""
 
-__all__ = ["Order", "SegmentMap", "Sight", "Source", "extract"]
+__all__ = ["Order", "SegmentMap", "Sight", "Source", "extract", "possible"]
 
 
 class Order(StrEnum):
@@ -141,6 +141,13 @@ class SegmentMap:
             tuple(source for part in parts for source in part.sources),
             tuple(sight for part in parts for sight in part.sights),
         )
+
+
+def possible(coordinates: FloatArray) -> NDArray[np.bool_]:
+    """Which of some rows x1, y1, x2, y2 in metres, (n, 4), a map can have as segments, (n,)."""
+    near = (np.abs(coordinates) <= FARTHEST).all(axis=1)  # false for NaN
+    with np.errstate(invalid="ignore", over="ignore"):
+        return near & (np.hypot(*(coordinates[:, 2:] - coordinates[:, :2]).T) > LEAST_LENGTH)
 
 
 def _checked_coordinates(coordinates: ArrayLike) -> FloatArray:

@@ -6,7 +6,7 @@ To add a format, write a module with a :class:`~segmap.logs.records.Format` and 
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 
 import numpy as np
@@ -59,6 +59,8 @@ FORMATS: tuple[Format, ...] = (
 """Every format read; the first that recognises a file reads it, and those with a mark of their own come first."""
 
 SQLITE = b"SQLite format 3\0"
+READINGS = 4_000_000
+"""enough of a log to find what stands for "no return"; of a larger one scans are taken evenly"""
 FAR = 100.0
 """metres; a log most of whose readings are farther is not in metres"""
 PACKED = {
@@ -119,14 +121,12 @@ def read_logs(source: LogSource, name: str | None = None, limits: Limits | None 
     if not records:
         return (_log(file.name, format, records, problems),)
     by_topic: dict[str, list[Record]] = defaultdict(list)
-    for record in records:
+    for record in _spent(records):
         by_topic[record.sensor if format.topics else ""].append(record)
     return _logs(file.name, format, by_topic, problems)
 
 
-def _logs(
-    name: str, format: Format, by_topic: Mapping[str, Sequence[Record]], problems: Problems
-) -> tuple[LaserLog, ...]:
+def _logs(name: str, format: Format, by_topic: Mapping[str, list[Record]], problems: Problems) -> tuple[LaserLog, ...]:
     """A log for each topic; what concerns the file is told with the first one."""
     logs = []
     for topic, records in by_topic.items():
@@ -136,12 +136,22 @@ def _logs(
     return tuple(logs)
 
 
-def _log(name: str, format: Format, records: Sequence[Record], problems: Problems, topic: str = "") -> LaserLog:
+def _log(name: str, format: Format, records: list[Record], problems: Problems, topic: str = "") -> LaserLog:
+    """The log of some records, which are let go one by one."""
     _check_unit(records, problems)
-    scans = _scans(records, silence := _silence(records), problems)
+    silence = _silence(records)
+    no_return = _main(records, silence)
+    scans = _scans(records, silence, problems)
     if not scans:
         problems.add(1, f"{name} is a {format.name} log without laser scans: choose a log that has some")
-    return LaserLog(name, scans, format.name, _main(records, silence), problems.all(), topic)
+    return LaserLog(name, scans, format.name, no_return, problems.all(), topic)
+
+
+def _spent(records: list[Record]) -> Iterator[Record]:
+    """The records in order; the list lets each go, so that a large log is not held twice."""
+    records.reverse()
+    while records:
+        yield records.pop()
 
 
 def _empty(file: LogFile, problems: Problems) -> LaserLog:
@@ -206,7 +216,8 @@ def _laser(record: Record) -> tuple[str, int]:
 
 def _silence_of(records: Sequence[Record]) -> NoReturn:
     declared = [record.declared_range for record in records if record.declared_range is not None]
-    return no_return([record.ranges for record in records], max(declared, default=None))
+    every = sum(len(record.ranges) for record in records) // READINGS + 1
+    return no_return([record.ranges for record in records[::every]], max(declared, default=None))
 
 
 def _main(records: Sequence[Record], silence: Mapping[tuple[str, int], NoReturn]) -> float | None:
@@ -216,10 +227,10 @@ def _main(records: Sequence[Record], silence: Mapping[tuple[str, int], NoReturn]
 
 
 def _scans(
-    records: Sequence[Record], silence: Mapping[tuple[str, int], NoReturn], problems: Problems
+    records: list[Record], silence: Mapping[tuple[str, int], NoReturn], problems: Problems
 ) -> tuple[LaserScan, ...]:
     scans = []
-    for record in records:
+    for record in _spent(records):
         try:
             scans.append(_scan(record, silence[_laser(record)].limit))
         except ScanError as error:

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from segmap.logs.records import Record
+from segmap.logs.records import Record, too_many
 from segmap.logs.text import MalformedError
 from segmap.pose import FloatArray
 
@@ -48,7 +48,10 @@ def laser_record(
     words = _Words(message, written)
     time = _header(words, written)
     first_angle, _, angle_step, _, _, nearest, farthest = words.floats(7).tolist()
-    echoes = _first_echoes(words) if kind == "MultiEchoLaserScan" else words.floats(words.count())
+    beams = words.count()
+    if wrong := too_many(beams):
+        raise MalformedError(wrong)
+    echoes = _first_echoes(words, beams) if kind == "MultiEchoLaserScan" else words.floats(beams)
     declared = farthest if math.isfinite(farthest) and farthest > max(nearest, 0.0) else None
     return Record(
         sensor=topic,
@@ -79,8 +82,7 @@ def _header(words: _Words, written: str) -> float:
     return seconds + nanoseconds * 1e-9
 
 
-def _first_echoes(words: _Words) -> FloatArray:
-    beams = words.count()
+def _first_echoes(words: _Words, beams: int) -> FloatArray:
     words.need(beams * NUMBER)
     first = np.full(beams, np.nan)
     for beam in range(beams):

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from segmap.logs.measured import NAMES, SENSOR, angles_named, scan_of
-from segmap.logs.records import Format, Problems, Record
+from segmap.logs.records import Format, Problems, Record, too_many
 from segmap.logs.source import LogFile
 from segmap.logs.text import MalformedError, number, shown
 
@@ -65,6 +65,8 @@ class _Columns:
         needed = max([*self.numbers.values(), self.ranges.start]) + 1
         if len(cells) < needed:
             raise MalformedError(f"the row has {len(cells)} values, fewer than its header names")
+        if wrong := too_many(len(cells) - self.ranges.start):
+            raise MalformedError(wrong)
         numbers = {name: _value(cells[i], name) for name, i in self.numbers.items()}
         sensor = cells[self.sensor].decode("utf-8", "replace") if self.sensor is not None else ""
         ranges = _readings(cells[self.ranges])

@@ -20,7 +20,7 @@ import numpy as np
 
 from segmap.errors import LogError
 from segmap.logs.measured import NAMES, SENSOR, scan_of
-from segmap.logs.records import Format, Problems, Record
+from segmap.logs.records import Format, Problems, Record, too_many
 from segmap.logs.source import LogFile
 from segmap.logs.text import MalformedError, printable
 from segmap.pose import FloatArray
@@ -100,7 +100,10 @@ def _record(scan: Mapping[str, Any], number: int) -> Record:
     pose = scan.get("pose")
     if pose is not None:
         numbers |= zip(("x", "y", "theta"), _numbers(pose, "pose").tolist(), strict=False)
-    return scan_of(numbers, _numbers(scan.get("ranges"), "ranges"), number, str(scan.get(SENSOR, "")))
+    ranges = scan.get("ranges")
+    if isinstance(ranges, list) and (wrong := too_many(len(ranges))):
+        raise MalformedError(wrong)
+    return scan_of(numbers, _numbers(ranges, "ranges"), number, str(scan.get(SENSOR, "")))
 
 
 def _number(value: Any, name: str) -> float | None:

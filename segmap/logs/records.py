@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 from segmap.logs.source import LogFile
 from segmap.pose import FloatArray, Pose2
-from segmap.scans import LogProblem
+from segmap.scans import MAX_BEAMS, LogProblem
 
-__all__ = ["Format", "Problems", "Record", "half_turn"]
+__all__ = ["Format", "Problems", "Record", "half_turn", "too_many"]
 
 
 NARROW = {101: math.radians(1.0), 201: math.radians(0.5), 401: math.radians(0.25)}
@@ -84,6 +84,11 @@ class Format:
     """what its records are counted in, for messages"""
     topics: bool = False
     """whether each of its sensors is a log of its own, called by its topic"""
+
+
+def too_many(beams: int) -> str | None:
+    """What is wrong with a scan of so many beams, which need not be read to say so; None: nothing."""
+    return f"a scan of {beams} beams is no laser's: more than {MAX_BEAMS} are not read" if beams > MAX_BEAMS else None
 
 
 def half_turn(beams: int) -> tuple[float, float]:

@@ -11,6 +11,7 @@ A segment is directed, free space on its left, where the file says so, and where
 from __future__ import annotations
 
 import re
+from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,13 +19,13 @@ from typing import Any
 
 import numpy as np
 
-from segmap.errors import LogError, MapError
+from segmap.errors import LogError
 from segmap.logs.ranges_json import document
 from segmap.logs.records import Problems
 from segmap.logs.source import Limits, LogFile, LogSource
 from segmap.logs.text import MalformedError, printable
 from segmap.scans import LogProblem
-from segmap.segments import SegmentMap, Source
+from segmap.segments import SegmentMap, Source, possible
 
 __all__ = ["MapPart", "MapsFile", "holds_maps", "is_maps", "read_maps"]
 
@@ -101,27 +102,40 @@ class _Part:
 
     def __init__(self, name: str, problems: Problems) -> None:
         self._name, self._problems = name, problems
-        self._rows: list[list[float]] = []
+        self._rows = array("d")
+        self._numbers: list[int] = []
         self._directed: list[bool] = []
         self._sources: list[tuple[Source, ...]] = []
 
     def add(self, row: Any, directed: bool, sources: tuple[Source, ...], number: int) -> None:
         """One more segment, the ``number``-th of the file."""
         try:
-            if not isinstance(row, list) or len(row) != 4 or not set(map(type, row)) <= {int, float}:
-                raise MapError("A segment is four numbers, x1, y1, x2, y2.")
-            self._rows.append(SegmentMap(np.array([row], np.float64)).coordinates[0].tolist())
-        except (MapError, OverflowError) as error:
-            reason = str(error).replace("Segment 0", "It")
-            self._problems.add(number, f"{reason} The segment was left out")
+            x1, y1, x2, y2 = _four(row)
+        except (TypeError, ValueError, OverflowError):
+            self._problems.add(number, "it is not four numbers, x1, y1, x2, y2, in metres; it was left out")
             return
+        self._rows.extend((x1, y1, x2, y2))
+        self._numbers.append(number)
         self._directed.append(directed)
         self._sources.append(sources)
 
     def whole(self) -> MapPart:
-        """All of them as a partial map."""
-        held = SegmentMap(np.array(self._rows), directed=np.array(self._directed, bool), sources=tuple(self._sources))
-        return MapPart(self._name, held)
+        """All of them that can be segments, as a partial map."""
+        rows = np.frombuffer(self._rows, np.float64).reshape(-1, 4) if self._rows else np.empty((0, 4))
+        good = possible(rows)
+        for place in np.flatnonzero(~good).tolist():
+            self._problems.add(self._numbers[place], "it has no length, or lies absurdly far away; it was left out")
+        sources = tuple(origin for origin, kept in zip(self._sources, good.tolist(), strict=True) if kept)
+        return MapPart(
+            self._name, SegmentMap(rows[good], directed=np.array(self._directed, bool)[good], sources=sources)
+        )
+
+
+def _four(row: Any) -> Iterator[float]:
+    """Four numbers as such; anything else raises TypeError, ValueError or OverflowError."""
+    if not isinstance(row, list) or not set(map(type, row)) <= {int, float}:
+        raise TypeError
+    return map(float, row)
 
 
 def _parts(held: Any, name: str, problems: Problems) -> Iterator[MapPart]:

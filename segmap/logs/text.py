@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from segmap.logs.records import Problems, Record
+from segmap.logs.records import Problems, Record, too_many
 from segmap.logs.source import LogFile
 from segmap.pose import FloatArray, Pose2
 
@@ -29,6 +29,7 @@ __all__ = [
 Parser: TypeAlias = Callable[[Sequence[bytes], int], Record | None]
 """Takes the words of a line and its number; a line that is no scan gives None."""
 
+READINGS = "readings"
 UNKNOWN_WORDS = 1000
 """different unknown first words that are told apart"""
 
@@ -81,6 +82,8 @@ def count_of(words: Sequence[bytes], place: int, what: str) -> int:
     if not re.fullmatch(rb"\+?[0-9]{1,9}", words[place]):
         raise MalformedError(f"the number of {what} is {shown(words[place])}, not a whole number")
     count, held = int(words[place]), len(words) - place - 1
+    if what == READINGS and (wrong := too_many(count)):
+        raise MalformedError(wrong)
     if count > held:
         raise MalformedError(f"{shown(words[0])} announces {count} {what} and holds {held}")
     return count
