@@ -13,8 +13,21 @@ from itertools import pairwise
 from joblib import Parallel, delayed
 
 from segmap.integration import Match, Verdict, match_maps
-from segmap.links import SIDE, Link, Pace, agreed, links_by_scan, pace_of, placed_from, steps_between, voted
+from segmap.links import (
+    RIVAL,
+    SIDE,
+    Consensus,
+    Link,
+    Pace,
+    agreed,
+    links_by_scan,
+    pace_of,
+    placed_from,
+    steps_between,
+    voted,
+)
 from segmap.parameters import Parameters
+from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 from segmap.spreading import Matches, Pair, spread
@@ -187,12 +200,30 @@ def _bridge(
         after = placed_from(keys[i], near, keys[i : i + SIDE])
         pairs = [(a, b) for a in before for b in after if (a, b) not in matches]
         matches.update(spread(maps, pairs, parameters, workers=workers, check=check))
-        steps = steps_between((keys[i - 1], keys[i]))
-        seen = _sightings(maps, (*before, *after))
-        consensus = voted(before, after, matches, seen, parameters, lambda T, steps=steps: pace.allows(T, steps))
-        if consensus is not None and consensus.clear:
+        if consensus := _across(maps, keys[i - 1 : i + 1], before, after, matches, pace, parameters):
             for vote in consensus.votes:
                 links[vote.pair] = Link.of(vote.pair, matches[vote.pair], vote.rank, "voted")
+
+
+def _across(
+    maps: Mapping[ScanId, SegmentMap],
+    ends: Sequence[ScanId],
+    before: Mapping[ScanId, Pose2],
+    after: Mapping[ScanId, Pose2],
+    matches: Matches,
+    pace: Pace,
+    parameters: Parameters,
+) -> Consensus | None:
+    """What the scans on both sides of a gap clearly agree on.
+
+    However the robot turned; or, where it could have turned either way, at the pace it mostly turns.
+    """
+    seen, steps = _sightings(maps, (*before, *after)), steps_between((ends[0], ends[1]))
+    anyhow = voted(before, after, matches, seen, parameters, lambda T: pace.reaches(T, steps))
+    if anyhow is None or anyhow.clear:
+        return anyhow
+    paced = voted(before, after, matches, seen, parameters, lambda T: pace.allows(T, steps))
+    return paced if paced is not None and paced.clear and paced.score >= RIVAL * anyhow.score else None
 
 
 def _sightings(maps: Mapping[ScanId, SegmentMap], scans: Iterable[ScanId]) -> dict[ScanId, Sighting]:

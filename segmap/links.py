@@ -60,6 +60,8 @@ MOST_CENTRES = 60
 """votes that are tried as the middle of a cluster"""
 MOST_JUDGED = 10
 """clusters that are judged by lines of sight"""
+JOINT_WEIGHTS = np.array((1.0, -3.0, -3.0, 0.0))
+"""what a metre supported, contradicted, shadowed and unseen adds: many pairs see little of each other"""
 JOINT_STEPS, JOINT_GATES = 4, (0.3, 0.1)
 """steps of refinement of each pair, and the gates in metres it begins and ends with"""
 PACE_PERCENTILE, PACE_FACTOR, PACE_SLACK = 98.0, 1.5, (0.2, math.radians(5.0))
@@ -121,7 +123,11 @@ class Pace:
 
     def allows(self, T_1_2: Pose2, steps: int = 1) -> bool:
         """Whether so many steps can lead there."""
-        return math.hypot(T_1_2.x, T_1_2.y) <= steps * self.distance and abs(T_1_2.theta) <= steps * self.turn
+        return self.reaches(T_1_2, steps) and abs(T_1_2.theta) <= steps * self.turn
+
+    def reaches(self, T_1_2: Pose2, steps: int = 1) -> bool:
+        """The same, should the robot turn faster than it mostly does."""
+        return math.hypot(T_1_2.x, T_1_2.y) <= steps * self.distance
 
 
 def pace_of(matches: Mapping[Pair, Match]) -> Pace:
@@ -317,13 +323,12 @@ def _joint_score(
     parameters: Parameters,
 ) -> float:
     """What the lines of sight of all pairs say of a transformation between their groups, metres."""
-    weights = np.array((1.0, -parameters.conflict_weight, -parameters.shadow_weight, 0.0))  # pairs may be far apart
     total = 0.0
     for a, T_1_a in group_1.items():
         for b, T_2_b in group_2.items():
             pose = np.array([tuple(T_1_a.inverse() @ T_1_2 @ T_2_b)])
             pose = refined(seen[a], seen[b], pose, JOINT_STEPS, *JOINT_GATES)
-            total += float(look(seen[a], seen[b], pose, parameters)[0] @ weights)
+            total += float(look(seen[a], seen[b], pose, parameters)[0] @ JOINT_WEIGHTS)
     return total
 
 

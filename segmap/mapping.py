@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby, product
+from itertools import combinations, groupby, pairwise, product
 
 import numpy as np
 
 from segmap.graph import Optimised, optimise
-from segmap.keyframes import Chain, chained
+from segmap.graph.edges import Parts
+from segmap.keyframes import chained
 from segmap.links import Link, Pace
-from segmap.loops import AGREE, Scene, across, borne_out, closure, in_pace, promising, proposals
+from segmap.loops import (
+    AGREE,
+    LEAST_AGREEMENT,
+    Scene,
+    across,
+    agreement,
+    borne_out,
+    closure,
+    in_pace,
+    promising,
+    proposals,
+)
 from segmap.parameters import Parameters
 from segmap.pose import Pose2
 from segmap.scans import ScanId
@@ -84,8 +96,8 @@ def map_scans(
     keys = sorted(key for chain in chains for key in chain.keys)
     links = {pair: link for chain in chains for pair, link in chain.links.items()}
     matches = {pair: match for chain in chains for pair, match in chain.matches.items()}
-    optimised = _close_loops(task, keys, links, matches)
-    every = [*links.values(), *_between(task, chains, optimised)]
+    _close_loops(task, keys, links, matches)
+    every = [*links.values(), *(replace(link, why="tracked") for chain in chains for link in chain.tracked.values())]
     final = optimise([link.edge for link in every], check=check)
     return WholeMap(final, tuple(every), tuple(keys), matches, tuple(sorted(maps)))
 
@@ -118,7 +130,7 @@ class _Task:
         )
 
 
-def _close_loops(task: _Task, keys: Sequence[ScanId], links: dict[Pair, Link], matches: Matches) -> Optimised:
+def _close_loops(task: _Task, keys: Sequence[ScanId], links: dict[Pair, Link], matches: Matches) -> None:
     """Search for closures within and between components until no more is found; ``links`` and ``matches`` grow."""
     scene = Scene(task.maps, keys, task.parameters)
     optimised = optimise([link.edge for link in links.values()], check=task.check)
@@ -133,7 +145,6 @@ def _close_loops(task: _Task, keys: Sequence[ScanId], links: dict[Pair, Link], m
         if not closures and not joined:
             break
         optimised = optimise([link.edge for link in links.values()], check=task.check)
-    return optimised
 
 
 def _sound(optimised: Optimised, links: Mapping[Pair, Link]) -> list[Link]:
@@ -142,14 +153,24 @@ def _sound(optimised: Optimised, links: Mapping[Pair, Link]) -> list[Link]:
 
 
 def _join(task: _Task, scene: Scene, optimised: Optimised, matches: Matches) -> list[Link]:
-    """Closures between components: each two are searched until a proposal is borne out."""
+    """Closures between components, those next to each other in a log first; what is joined is not joined again."""
     parts = [part for part in optimised.components if len(part) >= LEAST_JOINING]
-    return [
-        link
-        for i, part in enumerate(parts)
-        for other in parts[i + 1 :]
-        for link in _joined(task, scene, optimised.poses, part, other, matches)
-    ]
+    whole = Parts(len(parts))
+    links: list[Link] = []
+    for i, j in sorted(combinations(range(len(parts)), 2), key=lambda ij: _apart(parts[ij[0]], parts[ij[1]])):
+        if whole.of(i) != whole.of(j):
+            found = _joined(task, scene, optimised.poses, parts[i], parts[j], matches)
+            links.extend(found)
+            if found:
+                whole.join(i, j)
+    return links
+
+
+def _apart(part: Sequence[ScanId], other: Sequence[ScanId]) -> float:
+    """The least number of scans between two components in a log; infinite where they share no log."""
+    own = {**dict.fromkeys(part, False), **dict.fromkeys(other, True)}
+    steps = [b.scan - a.scan for a, b in pairwise(sorted(own)) if a.log == b.log and own[a] != own[b]]
+    return float(min(steps, default=np.inf))
 
 
 def _joined(
@@ -171,7 +192,8 @@ def _joined(
                 promises = across(scene, poses, part, other, T_1_2)
                 new = [promise.pair for promise in promises if promise.pair not in matches]
                 matches.update(task.spread(new, "joining components"))
-                if links := borne_out(promises, matches):
+                links = borne_out(promises, matches)
+                if links and agreement(scene, poses, part, other, T_1_2) >= LEAST_AGREEMENT:
                     return links
         if not waiting:
             return []
@@ -189,8 +211,3 @@ def _across(maps: Mapping[ScanId, SegmentMap], part: Sequence[ScanId], other: Se
 def _length(segment_map: SegmentMap) -> float:
     starts, ends = segment_map.coordinates[:, :2], segment_map.coordinates[:, 2:]
     return float(np.hypot(*(ends - starts).T).sum())
-
-
-def _between(task: _Task, chains: Iterable[Chain], optimised: Optimised) -> list[Link]:
-    """The links of all scans that are no keyframes."""
-    return [replace(link, why="tracked") for chain in chains for link in chain.tracked.values()]
