@@ -5,8 +5,8 @@
 The pair benchmark has neighbours and pairs without a common wall. In between lie scans that share a little: the two
 ends of a corridor, two like rooms. Of each log N pairs (1000) of scans within 15 m of each other are drawn with a
 fixed seed and matched in verified mode at the shipped defaults; the truth are the log's own corrected poses. A pose
-is called wrong only when it is off by more than 0.5 m or 10 degrees, because such poses err too. Pairs whose
-logged pose is known to be wrong (scans 42 and 364 of csail) are not drawn. Printed: pairs, accepted and accepted wrongly by
+is called wrong only when it is off by more than 0.5 m or 10 degrees, because such poses err too. Pairs whose logged
+pose is known to be wrong (scans 42 and 364 of csail) are not drawn. Printed: pairs, accepted and accepted wrongly by
 log and distance, and every pair accepted wrongly.
 """
 
