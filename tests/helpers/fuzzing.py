@@ -8,16 +8,19 @@ import random
 import struct
 import tempfile
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from bags import ECHOES, ROS_1, ROS_2, SCAN, laser_scan, multi_echo, ranges, texts, write_ros1, write_ros2
 
 from segmap.errors import SegmapError
 from segmap.export import export_map
-from segmap.logs import Limits, read_logs, read_maps
+from segmap.logs import Limits, read_logs, read_maps, read_pose_graph
 from segmap.merging import Component
 from segmap.segments import SegmentMap
 
+Read = Callable[[bytes], object]
 LIMITS = Limits(size=1 << 26, lines=1_000_000)
 SMALL = (0, 1, 127, 128, 255)
 BINARY = (
@@ -81,18 +84,27 @@ def maps() -> dict[str, bytes]:
     return {"GeoJSON map": export_map(parts, "geojson"), "JSON map": json.dumps(plain).encode()}
 
 
-def readers() -> Mapping[str, tuple[Callable[[bytes], object], bytes]]:
+def graphs() -> dict[str, bytes]:
+    """A small pose graph of each kind."""
+    steps = "".join(f"EDGE_SE2 {i} {i + 1} 1 0 0.1 100 0 0 100 0 400\n" for i in range(5))
+    g2o = "".join(f"VERTEX_SE2 {i} {i}.5 0 0.1\n" for i in range(6)) + "FIX 0\n" + steps
+    toro = "".join(f"VERTEX2 {i} {i}.5 0 0.1\n" for i in range(6))
+    toro += "".join(f"EDGE2 {i} {i + 1} 1 0 0.1 100 0 100 400 0 0\n" for i in range(5))
+    return {"g2o": g2o.encode(), "TORO": toro.encode()}
+
+
+def readers() -> Mapping[str, tuple[Read, bytes]]:
     """Every reader, with a good file of its kind."""
-    read_log_file = {
-        name: (lambda content: read_logs(content, "a<b>.log", LIMITS), good) for name, good in logs().items()
-    }
-    read_map_file = {
-        name: (lambda content: read_maps(content, "a<b>.json", LIMITS), good) for name, good in maps().items()
-    }
-    return {**read_log_file, **read_map_file}
+    kinds: tuple[tuple[Any, dict[str, bytes]], ...] = (
+        (read_logs, logs()),
+        (read_maps, maps()),
+        (read_pose_graph, graphs()),
+    )
+    every = ((name, read, good) for read, held in kinds for name, good in held.items())
+    return {name: (partial(read, name="a<b>.log", limits=LIMITS), good) for name, read, good in every}
 
 
-def outcome(read: Callable[[bytes], object], content: bytes) -> str:
+def outcome(read: Read, content: bytes) -> str:
     """``read``, or ``refused`` by one of segmap's errors in a printable sentence; all else is a mistake of ours."""
     try:
         found = read(content)
