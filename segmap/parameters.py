@@ -175,6 +175,18 @@ class Parameters(BaseModel):
         le=100000.0,
     )
 
+    # fusion of a whole (beyond the paper)
+    wall_spread: float = _parameter(
+        0.05,
+        "m",
+        "How far the segments of one wall scatter, by the errors of poses (standard deviation).",
+        gt=0.0,
+        le=1.0,
+    )
+    wall_witnesses: float = _parameter(
+        0.2, "", "A wall stays where this share of the scans that see its place found it (0: all stay).", ge=0.0, le=1.0
+    )
+
     # merging (IV)
     pivot_form: Literal["scan", "pair"] = _parameter(
         "scan", "", "pivot: fuse each new scan (Algorithm 6), or each pair's map moved by its pivot (IV-C)."

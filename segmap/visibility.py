@@ -9,6 +9,7 @@ a corridor. What several scans of a map saw weighs as if one of them had seen it
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,18 @@ from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
 from segmap.segments import SegmentMap, Sight
 
-__all__ = ["CLASS_NAMES", "Evidence", "Sighting", "classes", "evidence", "look", "score", "sighting", "thinned"]
+__all__ = [
+    "CLASS_NAMES",
+    "Evidence",
+    "Sighting",
+    "classes",
+    "evidence",
+    "look",
+    "score",
+    "sensors",
+    "sighting",
+    "thinned",
+]
 
 CLASS_NAMES = ("supported", "contradicted", "shadowed", "unseen")
 """the classes by number, and the columns of totals"""
@@ -61,13 +73,18 @@ def sighting(segment_map: SegmentMap) -> Sighting | None:
     if not sights:
         return None
     points = np.concatenate([_points(sight) for sight in sights])
+    beams, eyes = sensors(sights)
+    mean = float(points[:, 2].sum()) / len(eyes)
+    if len(eyes) > 1:
+        points[:, 2] /= kernels.witnesses(points, beams, eyes, SAME_PLACE, SURFACE_GAP)
+    return Sighting(points, beams, eyes, mean)
+
+
+def sensors(sights: Sequence[Sight]) -> tuple[FloatArray, FloatArray]:
+    """The beams and the sensors of some sights, one at least, as a :class:`Sighting` has them."""
     beams = np.concatenate([_beams(sight) for sight in sights])
     starts = np.cumsum([0] + [len(sight.scan) for sight in sights])
-    sensors = np.array([_sensor(sight, start) for sight, start in zip(sights, starts, strict=False)])
-    mean = float(points[:, 2].sum()) / len(sensors)
-    if len(sensors) > 1:
-        points[:, 2] /= kernels.witnesses(points, beams, sensors, SAME_PLACE, SURFACE_GAP)
-    return Sighting(points, beams, sensors, mean)
+    return beams, np.array([_sensor(sight, start) for sight, start in zip(sights, starts, strict=False)])
 
 
 def _points(sight: Sight) -> FloatArray:
