@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from segmap._kernels import TOUCH, directions
 from segmap.pose import FloatArray, IntArray
 
-__all__ = ["crossing", "evaluate", "matching_pairs"]
+__all__ = ["add_matches", "columns_of", "crossing", "evaluate", "matching_pairs", "move"]
 
 LANES = 8
 """the columns are a multiple of these"""
@@ -27,7 +27,7 @@ _inlined = njit(cache=True, nogil=True, error_model="numpy", inline="always")
 
 
 @_compiled
-def _columns(axes):  # type: ignore[no-untyped-def]
+def columns_of(axes):  # type: ignore[no-untyped-def]
     """Columns for a map of these directions and lengths (n, 3), with the lengths filled in."""
     columns = np.zeros((7, (len(axes) + LANES - 1) // LANES * LANES))
     columns[6, : len(axes)] = axes[:, 2]
@@ -35,7 +35,7 @@ def _columns(axes):  # type: ignore[no-untyped-def]
 
 
 @_compiled
-def _move(segments, axes, pose, columns):  # type: ignore[no-untyped-def]
+def move(segments, axes, pose, columns):  # type: ignore[no-untyped-def]
     cosine = math.cos(pose[2])
     sine = math.sin(pose[2])
     for j in range(len(segments)):
@@ -118,6 +118,16 @@ def _matching_value(s, u, columns, j, distance, rate):  # type: ignore[no-untype
     return value * math.exp(rate * distance)
 
 
+@_inlined
+def add_matches(value, s, u, columns, count, limit, rate, distances, near):  # type: ignore[no-untyped-def]
+    """A value with the matching values of a segment 1 and every segment 2 added, in order; the last two are scratch."""
+    _distances(s, u, columns, distances)
+    for q in range(_near(distances, count, limit, near)):
+        j = near[q]
+        value += _matching_value(s, u, columns, j, distances[j], rate)
+    return value
+
+
 # --- crossings (line 6) -----------------------------------------------------------------------------
 
 
@@ -140,13 +150,11 @@ def _cross(s, u, columns, length, tolerance, sine_refuse, result):  # type: igno
     x1, y1, x2, y2, ux, uy = columns[0], columns[1], columns[2], columns[3], columns[4], columns[5]
     for k in range(len(result)):
         start_2, end_2, start_1, end_1 = _sides(s, u, x1[k], y1[k], x2[k], y2[k], ux[k], uy[k])
-        meet_2 = (min(start_2, end_2) <= TOUCH) & (max(start_2, end_2) >= -TOUCH)
-        meet_1 = (min(start_1, end_1) <= TOUCH) & (max(start_1, end_1) >= -TOUCH)
-        along_2 = length * start_2 / (start_2 - end_2)
+        along_2 = length * start_2 / (start_2 - end_2)  # where the lines meet
         along_1 = u[2] * start_1 / (start_1 - end_1)
         inside = min(min(along_1, u[2] - along_1), min(along_2, length - along_2)) > tolerance
         steep = abs(u[0] * uy[k] - u[1] * ux[k]) > sine_refuse
-        result[k] |= steep & meet_2 & meet_1 & inside
+        result[k] |= steep & inside
 
 
 @_compiled
@@ -203,7 +211,7 @@ def evaluate(
     axes_1 = directions(segments_1)
     axes_2 = directions(segments_2)
     discarded = crossing(segments_1, segments_2, poses, tolerance, refuse_length, refuse_angle)
-    columns = _columns(axes_2)
+    columns = columns_of(axes_2)
     distances = np.empty(columns.shape[1])
     near = np.empty(columns.shape[1] + 1, np.int64)
     limit = threshold * tolerance
@@ -212,13 +220,10 @@ def evaluate(
         if discarded[k]:
             values[k] = np.nan
             continue
-        _move(segments_2, axes_2, poses[k], columns)
+        move(segments_2, axes_2, poses[k], columns)
         value = 0.0
         for i in range(len(segments_1)):
-            _distances(segments_1[i], axes_1[i], columns, distances)
-            for q in range(_near(distances, len(segments_2), limit, near)):
-                j = near[q]
-                value += _matching_value(segments_1[i], axes_1[i], columns, j, distances[j], rate)
+            value = add_matches(value, segments_1[i], axes_1[i], columns, len(segments_2), limit, rate, distances, near)
         values[k] = value
     return values
 
@@ -236,8 +241,8 @@ def matching_pairs(
     """The pairs (i, j) whose matching value under one pose is above ``least``, (m, 2), and the values, (m,)."""
     axes_1 = directions(segments_1)
     axes_2 = directions(segments_2)
-    columns = _columns(axes_2)
-    _move(segments_2, axes_2, pose, columns)
+    columns = columns_of(axes_2)
+    move(segments_2, axes_2, pose, columns)
     distances = np.empty(columns.shape[1])
     rate = math.log(penalty) / tolerance
     pairs = []

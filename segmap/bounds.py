@@ -1,6 +1,6 @@
 """Candidates -> upper bounds of their values, from tables made once for a pair of maps.
 
-:mod:`segmap._search_kernels` says why they are bounds.
+:mod:`segmap._bound_kernels` says why they are bounds.
 """
 
 from __future__ import annotations
@@ -11,29 +11,32 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from segmap import _search_kernels
-from segmap._search_kernels import Grid
+from segmap import _bound_kernels, _search_kernels
+from segmap._bound_kernels import Grid
+from segmap._search_kernels import Tables
 from segmap._threads import Crew
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray
 from segmap.segments import SegmentMap
 
-__all__ = ["upper_bounds"]
+__all__ = ["Bounds"]
 
 HEADINGS = 32
 """bins of half a turn"""
 KINDS = 4
 """most kinds of segments of map 2 by length, each up to twice as long as the next"""
-CELL = (1.0, 2.0)
+CELL = (1.4, 3.0)
 """least and greatest side of a cell, in distances at which segments cease to match"""
 COARSE = 1e8
-"""pairs of segments of all candidates together up to which cells are of the greatest side"""
+"""pairs of segments of all candidates together up to which cells have the greatest side"""
 CELLS = 1 << 23
 """most cells of all tables of a pair together"""
 ROTATIONS = (256, 1024)
 """fewest and most bins of a whole turn into which candidates are sorted"""
-PAINTED, LOOKED_UP = 8, 1 << 16
-"""tables and candidates between two looks at whether to stop"""
+PAINTED, LOOKED_UP, CLOSER = 8, 1 << 16, 4096
+"""tables painted, bounds looked up and closer ones found between two looks at whether to stop"""
+LEAST_CLOSER = 64
+"""fewer closer bounds are not worth a thread"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,19 +49,86 @@ class _Kinds:
     """shape (kinds, 2): least and greatest half length, metres"""
 
 
-def upper_bounds(
-    map_1: SegmentMap, map_2: SegmentMap, poses: FloatArray, parameters: Parameters, threads: Crew
-) -> FloatArray:
-    """What the value of each candidate ``T_1_2`` of ``poses`` (k, 3) cannot exceed, discarded or not, (k,), metres.
+class Bounds:
+    """Upper bounds of the values of some candidates ``T_1_2``, rows of ``poses`` (k, 3). Both maps need segments."""
 
-    Zero only where nothing matches. Both maps need segments.
-    """
-    rotations = _rotations(len(poses))
+    def __init__(
+        self, map_1: SegmentMap, map_2: SegmentMap, poses: FloatArray, parameters: Parameters, threads: Crew
+    ) -> None:
+        self._maps = map_1.coordinates, map_2.coordinates
+        self._poses = poses
+        self._measure = _limit(parameters), _rate(parameters)
+        self._above = 1.0 + 1.2e-7 * (len(map_1) + len(map_2) + 8)  # what sums in single precision may lack
+        self._threads = threads
+        self._tables = _tables(map_1, map_2, len(poses), parameters, threads)
+
+    def of_all(self) -> FloatArray:
+        """What no value exceeds, discarded or not, (k,), metres; zero only where nothing matches."""
+        order, starts = _search_kernels.by_rotation(self._poses, self._tables.rotations)
+        sums = np.empty(len(self._poses), np.float32)
+
+        def look_up(block: slice) -> None:
+            first, last = np.searchsorted(starts, (block.start, block.stop))
+            _search_kernels.look_up(self._tables, self._poses, order, starts, first, last, sums)
+
+        self._threads.run(look_up, self._threads.blocks(len(sums), LOOKED_UP))
+        return sums * np.float64(self._above)
+
+    def outlasting(self, rows: IntArray, least: float) -> IntArray:
+        """The rows whose value can be ``least`` and above, after a closer look."""
+        enough = least / self._above - 1e-9
+
+        def outlast(block: slice) -> NDArray[np.bool_]:
+            lasting: NDArray[np.bool_] = _search_kernels.outlast(
+                self._tables, self._poses, rows[block], *self._maps, *self._measure, enough
+            )
+            return lasting
+
+        kept = self._threads.run(outlast, self._threads.blocks(len(rows), CLOSER, LEAST_CLOSER))
+        return rows[np.concatenate([np.empty(0, bool), *kept])]
+
+
+def _tables(map_1: SegmentMap, map_2: SegmentMap, candidates: int, parameters: Parameters, threads: Crew) -> Tables:
     kinds = _kinds(map_2.lengths)
-    grid, shape = _grid(map_1, map_2, len(poses), parameters, len(kinds.halves))
-    tables = _painted(map_1, kinds, grid, shape, parameters, threads)
-    sums = _looked_up(tables, kinds, map_2, poses, rotations, grid, threads)
-    return sums * np.float64(1.0 + 1.2e-7 * (len(map_1) + len(map_2) + 8))  # each a sum in single precision
+    grid, shape = _grid(map_1, map_2, candidates, parameters, len(kinds.halves))
+    painted = np.empty((len(kinds.halves), HEADINGS, *shape), np.float32)
+
+    def paint(block: slice) -> None:
+        _bound_kernels.paint(
+            painted,
+            block.start,
+            block.stop,
+            map_1.coordinates,
+            kinds.halves,
+            grid,
+            _limit(parameters),
+            _rate(parameters),
+        )
+
+    threads.run(paint, threads.blocks(len(kinds.halves) * HEADINGS, PAINTED))
+    middles = 0.5 * (map_2.coordinates[:, :2] + map_2.coordinates[:, 2:])
+    middle = middles.mean(axis=0)
+    return Tables(
+        painted.reshape(-1, shape[0] * shape[1]),
+        HEADINGS,
+        *shape,
+        grid,
+        kinds.of,
+        middles - middle,
+        middle,
+        map_2.headings,
+        _rotations(candidates),
+    )
+
+
+def _limit(parameters: Parameters) -> float:
+    """The distance at which segments cease to match, metres."""
+    return parameters.segment_distance_threshold * parameters.point_distance_tolerance
+
+
+def _rate(parameters: Parameters) -> float:
+    """The logarithm of the penalty for a metre of distance."""
+    return math.log(parameters.distance_penalty) / parameters.point_distance_tolerance
 
 
 def _rotations(candidates: int) -> int:
@@ -79,7 +149,7 @@ def _grid(
     map_1: SegmentMap, map_2: SegmentMap, candidates: int, parameters: Parameters, kinds: int
 ) -> tuple[Grid, tuple[int, int]]:
     """Cells over map 1, and beyond as far as all but steep pairs can reach; rows and columns."""
-    limit = parameters.segment_distance_threshold * parameters.point_distance_tolerance
+    limit = _limit(parameters)
     points = map_1.coordinates.reshape(-1, 2)
     beyond = 0.5 * map_2.lengths.max() + 4.0 * limit
     corner = points.min(axis=0) - beyond
@@ -99,7 +169,7 @@ def _grid(
 def _fineness(pairs: int) -> float:
     """Side of a cell in distances: the more there is to save, the finer."""
     least, most = CELL
-    return max(least, most * min(1.0, COARSE / pairs) ** 0.25)
+    return max(least, most * min(1.0, COARSE / pairs) ** (1 / 3))
 
 
 def _rounding(map_1: SegmentMap, map_2: SegmentMap, sides: FloatArray) -> float:
@@ -107,43 +177,3 @@ def _rounding(map_1: SegmentMap, map_2: SegmentMap, sides: FloatArray) -> float:
     farthest = max(np.abs(map_1.coordinates).max(), np.abs(map_2.coordinates).max())
     wide = np.ptp(map_2.coordinates.reshape(-1, 2), axis=0).sum()
     return float(1e-6 * (sides.sum() + wide) + 1e-13 * farthest + 1e-8)
-
-
-def _painted(
-    map_1: SegmentMap, kinds: _Kinds, grid: Grid, shape: tuple[int, int], parameters: Parameters, threads: Crew
-) -> NDArray[np.float32]:
-    """The tables, (kinds, headings, rows, columns)."""
-    tables = np.empty((len(kinds.halves), HEADINGS, *shape), np.float32)
-    limit = parameters.segment_distance_threshold * parameters.point_distance_tolerance
-    rate = math.log(parameters.distance_penalty) / parameters.point_distance_tolerance
-
-    def paint(block: slice) -> None:
-        _search_kernels.paint(tables, block.start, block.stop, map_1.coordinates, kinds.halves, grid, limit, rate)
-
-    threads.run(paint, threads.blocks(len(kinds.halves) * HEADINGS, PAINTED))
-    return tables
-
-
-def _looked_up(
-    tables: NDArray[np.float32],
-    kinds: _Kinds,
-    map_2: SegmentMap,
-    poses: FloatArray,
-    rotations: int,
-    grid: Grid,
-    threads: Crew,
-) -> NDArray[np.float32]:
-    """The sum of what the tables hold for each segment of map 2, for every candidate."""
-    order, starts = _search_kernels.by_rotation(poses, rotations)
-    middles = 0.5 * (map_2.coordinates[:, :2] + map_2.coordinates[:, 2:])
-    middle = middles.mean(axis=0)
-    sums = np.empty(len(poses), np.float32)
-
-    def look_up(block: slice) -> None:
-        first, last = np.searchsorted(starts, (block.start, block.stop))
-        _search_kernels.look_up(
-            tables, kinds.of, middles - middle, map_2.headings, middle, poses, order, starts, first, last, grid, sums
-        )
-
-    threads.run(look_up, threads.blocks(len(poses), LOOKED_UP))
-    return sums

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from segmap import _value_kernels
 from segmap._threads import Crew, crew
-from segmap.bounds import upper_bounds
+from segmap.bounds import Bounds
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
 from segmap.segments import SegmentMap
@@ -21,11 +21,13 @@ BLOCK = 4096
 """candidates evaluated between two looks at whether to stop"""
 LEAST_BLOCK = 64
 """fewer candidates are not worth a thread"""
+CROSSED = 1 << 16
+"""candidates looked at for crossings between two looks at whether to stop"""
 FIRST = 256
 """least number of candidates evaluated first, those of the highest bounds"""
-BOUNDED = 1 << 23
+BOUNDED = 1 << 22
 """pairs of segments of all candidates together above which bounds pay"""
-SPARSE = 32
+SPARSE = 16
 """and how many candidates there must be for each that is wanted"""
 LEAST_MATCH = 1e-9
 """metres; smaller matching values are none"""
@@ -58,7 +60,7 @@ def evaluate(
     blocks of candidates over threads; ``check`` is called between blocks and raises to stop.
     """
     with crew(workers, check) as threads:
-        return _values(map_1, map_2, poses, parameters, threads)
+        return _Task(map_1, map_2, poses, parameters, threads).values(poses)
 
 
 def search(
@@ -77,14 +79,13 @@ def search(
     ``workers`` and ``check`` as in :func:`evaluate`.
     """
     with crew(workers, check) as threads:
-        if not _bounds_pay(map_1, map_2, len(poses), count):
-            values = _values(map_1, map_2, poses, parameters, threads)
-            rows = best(values, count)
-            return Best(rows, values[rows], int(np.isnan(values).sum()))
-        discarded = _discarded(map_1, map_2, poses, parameters, threads)
-        bounds = upper_bounds(map_1, map_2, poses, parameters, threads)
-        bounds[discarded] = 0.0
-        values = _best_values(map_1, map_2, poses, parameters, bounds, count, threads)
+        task = _Task(map_1, map_2, poses, parameters, threads)
+        if task.bounds_pay(count):
+            discarded = task.discarded()
+            values = task.best_values(count, ~discarded)
+        else:
+            values = task.values(poses)
+            discarded = np.isnan(values)
         rows = best(values, count)
         return Best(rows, values[rows], int(discarded.sum()))
 
@@ -119,73 +120,67 @@ def _measure(parameters: Parameters) -> tuple[float, float, float]:
     )
 
 
-def _values(
-    map_1: SegmentMap, map_2: SegmentMap, poses: FloatArray, parameters: Parameters, threads: Crew
-) -> FloatArray:
-    def block(rows: slice) -> FloatArray:
-        values: FloatArray = _value_kernels.evaluate(
-            map_1.coordinates,
-            map_2.coordinates,
-            poses[rows],
-            *_measure(parameters),
-            parameters.segment_length_refuse,
-            parameters.refuse_angle,
-        )
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """Candidates to find the values of."""
+
+    map_1: SegmentMap
+    map_2: SegmentMap
+    poses: FloatArray
+    parameters: Parameters
+    threads: Crew
+
+    def values(self, poses: FloatArray) -> FloatArray:
+        """Values of some poses, (k,), in blocks over the threads."""
+
+        def block(rows: slice) -> FloatArray:
+            p, kernel = self.parameters, _value_kernels.evaluate
+            refused = p.segment_length_refuse, p.refuse_angle
+            values: FloatArray = kernel(*self._coordinates, poses[rows], *_measure(p), *refused)
+            return values
+
+        blocks = self.threads.blocks(len(poses), BLOCK, LEAST_BLOCK)
+        return np.concatenate([np.empty(0), *self.threads.run(block, blocks)])
+
+    def discarded(self) -> NDArray[np.bool_]:
+        """Which candidates long crossing segments discard, (k,) (line 6)."""
+
+        def block(rows: slice) -> NDArray[np.bool_]:
+            p, kernel = self.parameters, _value_kernels.crossing
+            refused = p.segment_length_refuse, p.refuse_angle
+            crossing: NDArray[np.bool_] = kernel(
+                *self._coordinates, self.poses[rows], p.point_distance_tolerance, *refused
+            )
+            return crossing
+
+        return np.concatenate(self.threads.run(block, self.threads.blocks(len(self.poses), CROSSED)))
+
+    def bounds_pay(self, count: int) -> bool:
+        """Whether bounds cost less than they save."""
+        candidates = len(self.poses)
+        return SPARSE * count < candidates and candidates * len(self.map_1) * len(self.map_2) > BOUNDED
+
+    def best_values(self, count: int, allowed: NDArray[np.bool_]) -> FloatArray:
+        """Values, (k,): those of the best ``count`` of the allowed and of all that tie with them; others may be zero.
+
+        Candidates come by their bounds, the highest first, until no bound reaches the worst of the best.
+        """
+        closer = Bounds(self.map_1, self.map_2, self.poses, self.parameters, self.threads)
+        bounds = closer.of_all() * allowed
+        values, top, size = np.zeros(len(bounds)), np.zeros(count), max(FIRST, 2 * count)
+        left = np.flatnonzero(bounds > 0.0)
+        while len(left):
+            if size < len(left):
+                left = left[np.argpartition(-bounds[left], size)]
+            now, left = np.sort(left[:size]), left[size:]
+            if top[0] > 0.0:
+                now = closer.outlasting(now, top[0])
+            values[now] = self.values(self.poses[now])
+            top = np.sort(np.concatenate((top, values[now])))[-count:]
+            left = left[bounds[left] >= top[0]]
+            size *= 2
         return values
 
-    return np.concatenate([np.empty(0), *threads.run(block, threads.blocks(len(poses), BLOCK, LEAST_BLOCK))])
-
-
-# --- the best without the value of every one --------------------------------------------------------
-
-
-def _bounds_pay(map_1: SegmentMap, map_2: SegmentMap, candidates: int, count: int) -> bool:
-    """Whether bounds cost less than they save."""
-    return SPARSE * count < candidates and candidates * len(map_1) * len(map_2) > BOUNDED
-
-
-def _discarded(
-    map_1: SegmentMap, map_2: SegmentMap, poses: FloatArray, parameters: Parameters, threads: Crew
-) -> NDArray[np.bool_]:
-    """Which candidates long crossing segments discard (line 6)."""
-
-    def block(rows: slice) -> NDArray[np.bool_]:
-        crossing: NDArray[np.bool_] = _value_kernels.crossing(
-            map_1.coordinates,
-            map_2.coordinates,
-            poses[rows],
-            parameters.point_distance_tolerance,
-            parameters.segment_length_refuse,
-            parameters.refuse_angle,
-        )
-        return crossing
-
-    return np.concatenate(threads.run(block, threads.blocks(len(poses), 16 * BLOCK)))
-
-
-def _best_values(
-    map_1: SegmentMap,
-    map_2: SegmentMap,
-    poses: FloatArray,
-    parameters: Parameters,
-    bounds: FloatArray,
-    count: int,
-    threads: Crew,
-) -> FloatArray:
-    """Values, (k,): the best ``count`` are theirs, and so are ties; others may be zero.
-
-    Ever more candidates of the highest bounds are evaluated, until no bound reaches the worst of the best.
-    """
-    values = np.zeros(len(poses))
-    top = np.zeros(count)
-    left = np.flatnonzero(bounds > 0.0)
-    size = max(FIRST, 2 * count)
-    while len(left):
-        if size < len(left):
-            left = left[np.argpartition(-bounds[left], size)]
-        now, left = np.sort(left[:size]), left[size:]
-        values[now] = _values(map_1, map_2, poses[now], parameters, threads)
-        top = np.sort(np.concatenate((top, values[now])))[-count:]
-        left = left[bounds[left] >= top[0]]
-        size *= 2
-    return values
+    @property
+    def _coordinates(self) -> tuple[FloatArray, FloatArray]:
+        return self.map_1.coordinates, self.map_2.coordinates

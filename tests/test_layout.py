@@ -23,6 +23,7 @@ ORDER = (
     "_value_kernels",
     "_sight_kernels",
     "_field_kernels",
+    "_bound_kernels",
     "_search_kernels",
     "scans",
     "segments",

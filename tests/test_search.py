@@ -12,7 +12,7 @@ from worlds import maps, poses, room
 from segmap import evaluation
 from segmap._threads import crew
 from segmap._value_kernels import crossing
-from segmap.bounds import upper_bounds
+from segmap.bounds import Bounds
 from segmap.candidates import POSE_RESOLUTION, Candidates, _Seen, candidates
 from segmap.errors import CancelledError
 from segmap.evaluation import best, evaluate, matching_values, search
@@ -37,7 +37,7 @@ def found(map_1, map_2, parameters, heuristic="all"):
 
 def bounds_of(map_1, map_2, rows, parameters, workers=1):
     with crew(workers) as threads:
-        return upper_bounds(map_1, map_2, rows, parameters, threads)
+        return Bounds(map_1, map_2, rows, parameters, threads).of_all()
 
 
 def assert_same_best(map_1, map_2, rows, parameters, *counts, workers=1):
@@ -122,6 +122,20 @@ def test_no_value_of_any_pose_exceeds_its_bound(map_1, map_2, some):
     assert (bounds_of(map_1, map_2, rows, parameters) >= evaluate(map_1, map_2, rows, parameters)).all()
 
 
+@given(st.integers(0, 2**32 - 1))
+@quick
+def test_what_reaches_a_value_outlasts_a_closer_look(seed):
+    """Whatever value is asked for, those that have it or more stay, and no others."""
+    map_1, map_2, rows, parameters = hard_case(seed)
+    values = evaluate(map_1, map_2, rows, parameters.replace(**KEEP_ALL))
+    with crew(2) as threads:
+        bounds = Bounds(map_1, map_2, rows, parameters, threads)
+        for least in np.quantile(values[values > 0.0], [0.0, 0.3, 0.9, 1.0], method="lower") if values.any() else ():
+            kept = bounds.outlasting(np.arange(len(rows)), least)
+            assert set(np.flatnonzero(values >= least)) <= set(kept)
+            assert (values[kept] >= 0.999 * least - 1e-8).all()
+
+
 def test_a_bound_is_zero_where_nothing_can_match():
     """Maps a kilometre apart: no bound, so nothing to evaluate."""
     rows = np.array([[1000.0, 0.0, 0.3], [0.0, -1000.0, 2.0]])
@@ -166,6 +180,22 @@ def test_real_pairs_have_the_best_of_brute_force(always_bounded, benchmarks, dat
             assert_same_best(*maps_of_pair, rows, parameters, 1, 50, 1500, workers=workers)
             compared += 1
     assert compared >= 20
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 60, 400])
+def test_bounds_as_tight_as_can_be_lose_nothing(always_bounded, monkeypatch, count):
+    """Where bounds hardly exceed the values, and later rows look better, ties are evaluated all the same."""
+
+    class Tight(Bounds):
+        def of_all(self):
+            later = 1.0 + 1e-12 * np.arange(len(rows))
+            return np.nan_to_num(evaluate(square, square, rows, Parameters())) * later
+
+    square = room(4.0, 4.0)
+    rows = np.tile(found(square, square, Parameters()), (40, 1))
+    monkeypatch.setattr(evaluation, "Bounds", Tight)
+    monkeypatch.setattr(evaluation, "FIRST", 1)
+    assert_same_best(square, square, rows, Parameters(), count)
 
 
 def test_ties_go_to_the_first(always_bounded):
