@@ -3,10 +3,10 @@
 ::
 
     VERTEX_SE2 id x y theta
-    FIX id                                                     the first scan of each component
     EDGE_SE2 id id x y theta I11 I12 I13 I22 I23 I33           the information in the frame of the second scan
+    FIX id                                                     the first scan of each component
 
-An id is the number of the scan in its log where there is one log, else the scan's place in the table of
+gtsam takes no more edges after a line it does not know, remarks and FIX included: they come last. An id is the number of the scan in its log where there is one log, else the scan's place in the table of
 time stamps, ``id,log,scan,time``.
 """
 
@@ -24,9 +24,6 @@ from segmap.scans import ScanId
 
 __all__ = ["G2O", "pose_graph", "time_stamps", "write_g2o"]
 
-NEIGHBOURS = "#SEQUENTIAL EDGES"
-LOOPS = "#LOOP EDGES"
-
 
 def write_g2o(content: Content) -> Files:
     """All components in one graph, each in its own frame, and the time stamps."""
@@ -39,19 +36,13 @@ def write_g2o(content: Content) -> Files:
 def pose_graph(parts: Sequence[Mapping[ScanId, Pose2]], edges: Sequence[Edge], remarks: Sequence[str] = ()) -> bytes:
     """The poses of each component and the edges between them, as the bytes of a g2o file.
 
-    Edges at scans without a pose are left out. Edges between neighbours in a log come first, loop closures
-    after them, and remarks say which is which. ``remarks`` become comments at the beginning.
+    Edges at scans without a pose are left out. ``remarks`` become comments at the end.
     """
     ids = _ids([scan for poses in parts for scan in poses])
-    known = [edge for edge in edges if edge.first in ids and edge.second in ids]
-    near = [edge for edge in known if _neighbours(edge)]
-    far = [edge for edge in known if not _neighbours(edge)]
-    lines = [f"# {' '.join(line.split())}" for line in remarks]
-    for poses in parts:
-        lines += [f"VERTEX_SE2 {ids[scan]} {_numbers(poses[scan])}" for scan in sorted(poses)]
+    lines = [f"VERTEX_SE2 {ids[scan]} {_numbers(poses[scan])}" for poses in parts for scan in sorted(poses)]
+    lines += _edges([edge for edge in edges if edge.first in ids and edge.second in ids], ids)
     lines += [f"FIX {ids[min(poses)]}" for poses in parts if poses]
-    for mark, those in ((NEIGHBOURS, near), (LOOPS, far)):
-        lines += [mark, *_edges(those, ids)] if those else []
+    lines += [f"# {' '.join(line.split())}" for line in remarks]
     return "".join(f"{line}\n" for line in lines).encode("utf-8")
 
 
@@ -71,11 +62,9 @@ def _ids(scans: Sequence[ScanId]) -> dict[ScanId, int]:
     return {scan: place for place, scan in enumerate(ordered)}
 
 
-def _neighbours(edge: Edge) -> bool:
-    return edge.first.log == edge.second.log and abs(edge.first.scan - edge.second.scan) == 1
-
-
 def _edges(edges: Sequence[Edge], ids: Mapping[ScanId, int]) -> list[str]:
+    if not edges:
+        return []
     upper = np.triu_indices(3)
     information = _information(edges)[:, upper[0], upper[1]]
     return [
@@ -91,7 +80,7 @@ def _information(edges: Sequence[Edge]) -> FloatArray:
 
 
 def _numbers(numbers: Pose2 | FloatArray) -> str:
-    return " ".join(f"{number + 0.0:.12g}" for number in numbers)
+    return " ".join(repr(float(number) + 0.0) for number in numbers)
 
 
 G2O = ExportFormat(

@@ -7,6 +7,7 @@ least squares, with a robust kernel that silences edges the others contradict.
 from __future__ import annotations
 
 from segmap.graph.edges import SOURCES, Covariance, Edge, components
+from segmap.graph.importing import imported_edges
 from segmap.graph.marginals import Marginals, Softness
 from segmap.graph.optimised import Iteration, Optimised, Residual
 from segmap.graph.optimising import BACKENDS, GATE, optimise
@@ -33,6 +34,7 @@ __all__ = [
     "Ways",
     "components",
     "explain",
+    "imported_edges",
     "loop_of",
     "optimise",
     "preview",

@@ -17,6 +17,7 @@ from bags import ECHOES, ROS_1, ROS_2, SCAN, laser_scan, multi_echo, ranges, tex
 from segmap.errors import SegmapError
 from segmap.export import export_map
 from segmap.logs import Limits, read_logs, read_maps, read_pose_graph
+from segmap.logs.tables import read_relations, read_trajectory
 from segmap.merging import Component
 from segmap.segments import SegmentMap
 
@@ -93,12 +94,24 @@ def graphs() -> dict[str, bytes]:
     return {"g2o": g2o.encode(), "TORO": toro.encode()}
 
 
+def relations() -> dict[str, bytes]:
+    """Relations between moments."""
+    return {"relations": "\n".join(f"{i}.5 {i + 1}.5 0.4 0.1 0 0 0 0.2" for i in range(6)).encode()}
+
+
+def trajectories() -> dict[str, bytes]:
+    """A trajectory."""
+    return {"TUM": "\n".join(["# a remark", *(f"{i}.5 1 2 0 0 0 0.6 0.8" for i in range(6))]).encode()}
+
+
 def readers() -> Mapping[str, tuple[Read, bytes]]:
     """Every reader, with a good file of its kind."""
     kinds: tuple[tuple[Any, dict[str, bytes]], ...] = (
         (read_logs, logs()),
         (read_maps, maps()),
         (read_pose_graph, graphs()),
+        (read_relations, relations()),
+        (read_trajectory, trajectories()),
     )
     every = ((name, read, good) for read, held in kinds for name, good in held.items())
     return {name: (partial(read, name="a<b>.log", limits=LIMITS), good) for name, read, good in every}
