@@ -14,7 +14,6 @@ from joblib import Parallel, delayed
 
 from segmap.integration import Match, Verdict, match_maps
 from segmap.links import (
-    RIVAL,
     SIDE,
     Consensus,
     Link,
@@ -43,6 +42,8 @@ HALVED = 3
 """scans between two keyframes from which on one is put half-way"""
 RETURNS = 90
 """returns of each scan that judge what is voted for"""
+FASTER_TURN = 0.5
+"""share of the score of a faster turn below which what is in pace is given up for it"""
 SPARSE = 1.0 / 3.0
 """where more than this share of the scans would be keyframes, all are"""
 
@@ -214,16 +215,17 @@ def _across(
     pace: Pace,
     parameters: Parameters,
 ) -> Consensus | None:
-    """What the scans on both sides of a gap clearly agree on.
+    """What the scans on both sides of a gap clearly agree on, at the pace the robot mostly turns.
 
-    However the robot turned; or, where it could have turned either way, at the pace it mostly turns.
+    A faster turn is believed where nothing in pace fits half as well.
     """
     seen, steps = _sightings(maps, (*before, *after)), steps_between((ends[0], ends[1]))
-    anyhow = voted(before, after, matches, seen, parameters, lambda T: pace.reaches(T, steps))
-    if anyhow is None or anyhow.clear:
-        return anyhow
     paced = voted(before, after, matches, seen, parameters, lambda T: pace.allows(T, steps))
-    return paced if paced is not None and paced.clear and paced.score >= RIVAL * anyhow.score else None
+    anyhow = voted(before, after, matches, seen, parameters, lambda T: pace.reaches(T, steps))
+    fits = 0.0 if paced is None else paced.score
+    if anyhow is not None and anyhow.clear and fits < FASTER_TURN * anyhow.score:
+        return anyhow
+    return paced if paced is not None and paced.clear else None
 
 
 def _sightings(maps: Mapping[ScanId, SegmentMap], scans: Iterable[ScanId]) -> dict[ScanId, Sighting]:

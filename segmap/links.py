@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -54,14 +54,14 @@ PACED_CONFIDENCE = 0.9
 """a candidate that is the only one in pace needs this much"""
 PACED_LEAD = 0.2
 """and this share of its score as its lead over the next one in pace"""
-LEAST_VOTES, LEAST_SCORE, RIVAL = 2, 6.0, 0.85
-"""pairs that must agree, the metres all must score together, and the share of it the best rival may have"""
+LEAST_VOTES, LEAST_SCORE, LEAST_LEAD = 2, 6.0, 0.1
+"""pairs that must agree, the metres all must score together, and the share of it they must be ahead of any rival"""
 MOST_CENTRES = 60
 """votes that are tried as the middle of a cluster"""
 MOST_JUDGED = 10
 """clusters that are judged by lines of sight"""
-JOINT_WEIGHTS = np.array((1.0, -3.0, -3.0, 0.0))
-"""what a metre supported, contradicted, shadowed and unseen adds: many pairs see little of each other"""
+SEVERITIES = np.array([2.0, 4.0])
+"""what a metre against takes from the metres supported: mildly and severely judged, the best must be the best"""
 JOINT_STEPS, JOINT_GATES = 4, (0.3, 0.1)
 """steps of refinement of each pair, and the gates in metres it begins and ends with"""
 PACE_PERCENTILE, PACE_FACTOR, PACE_SLACK = 98.0, 1.5, (0.2, math.radians(5.0))
@@ -273,13 +273,13 @@ class Consensus:
     """pairs that must agree: fewer where a group is a single scan"""
     score: float
     """metres: what the lines of sight of all pairs say of it, support less conflict"""
-    rival: float
-    """metres: the same of the best distinct other transformation"""
+    lead: float
+    """share of the score by which it is ahead of every distinct other, however severely conflict is judged"""
 
     @property
     def clear(self) -> bool:
         """Whether enough speaks for it, and for nothing else."""
-        return len(self.votes) >= self.needed and self.score >= LEAST_SCORE and self.rival <= RIVAL * self.score
+        return len(self.votes) >= self.needed and self.score >= LEAST_SCORE and self.lead >= LEAST_LEAD
 
 
 def voted(
@@ -303,33 +303,34 @@ def voted(
             agreeing = _one_each(other for other in votes if _same(other.T_1_2, vote.T_1_2))
             clusters.append((sum(other.weight for other in agreeing), vote.T_1_2, agreeing))
     clusters.sort(key=lambda cluster: -cluster[0])
-    needed = min(LEAST_VOTES, len(group_1), len(group_2))
-    judged = [
-        Consensus(T_1_2, agreeing, needed, _joint_score(group_1, group_2, T_1_2, seen, parameters), 0.0)
-        for _, T_1_2, agreeing in clusters[:MOST_JUDGED]
-    ]
+    judged = clusters[:MOST_JUDGED]
     if not judged:
         return None
-    best = max(judged, key=lambda consensus: consensus.score)
-    rivals = [other.score for other in judged if not _nearly(other.T_1_2, best.T_1_2)]
-    return replace(best, rival=max(rivals, default=0.0))
+    totals = np.array([_joint(group_1, group_2, T_1_2, seen, parameters) for _, T_1_2, _ in judged])
+    scores = totals[:, :1] - totals[:, 1:] * SEVERITIES
+    best = int(np.argmax(scores.mean(axis=1)))
+    apart = [k for k, (_, T_1_2, _) in enumerate(judged) if not _nearly(T_1_2, judged[best][1])]
+    rivals = scores[apart].max(axis=0, initial=0.0)
+    leads = np.where(scores[best] > 0.0, 1.0 - rivals / np.maximum(scores[best], LEAST_SCORE), 0.0)
+    needed = min(LEAST_VOTES, len(group_1), len(group_2))
+    return Consensus(judged[best][1], judged[best][2], needed, float(scores[best].mean()), float(leads.min()))
 
 
-def _joint_score(
+def _joint(
     group_1: Mapping[ScanId, Pose2],
     group_2: Mapping[ScanId, Pose2],
     T_1_2: Pose2,
     seen: Mapping[ScanId, Sighting],
     parameters: Parameters,
-) -> float:
-    """What the lines of sight of all pairs say of a transformation between their groups, metres."""
-    total = 0.0
+) -> tuple[float, float]:
+    """How many metres all pairs together support of a transformation between their groups, and speak against."""
+    totals = np.zeros(4)
     for a, T_1_a in group_1.items():
         for b, T_2_b in group_2.items():
             pose = np.array([tuple(T_1_a.inverse() @ T_1_2 @ T_2_b)])
             pose = refined(seen[a], seen[b], pose, JOINT_STEPS, *JOINT_GATES)
-            total += float(look(seen[a], seen[b], pose, parameters)[0] @ JOINT_WEIGHTS)
-    return total
+            totals += look(seen[a], seen[b], pose, parameters)[0]
+    return float(totals[0]), float(totals[1] + totals[2])
 
 
 def _nearly(T: Pose2, other: Pose2) -> bool:
@@ -361,23 +362,41 @@ def _one_each(votes: Iterable[Vote]) -> tuple[Vote, ...]:
 
 
 def _outvoted(sequence: Sequence[ScanId], links: dict[Pair, Link]) -> dict[Pair, Link]:
-    """The links without those that the others across the same step contradict."""
+    """The links without those that the others across the same steps contradict, the most contradicted first."""
     place = {scan: i for i, scan in enumerate(sequence)}
+    kept = dict(links)
+    while against := _contradicted(sequence, place, kept):
+        touched: list[int] = []
+        for pair in sorted(against, key=lambda pair: (-against[pair], pair)):
+            if all(abs(place[pair[0]] - other) > 2 * SIDE for other in touched):
+                touched.append(place[pair[0]])
+                del kept[pair]
+    return kept
+
+
+def _contradicted(
+    sequence: Sequence[ScanId], place: Mapping[ScanId, int], links: Mapping[Pair, Link]
+) -> dict[Pair, float]:
+    """How much more speaks against each link than for it, on the average of the steps it goes across."""
     across: dict[int, list[Link]] = {}
     for link in links.values():
         for step in range(place[link.first], place[link.second]):
             across.setdefault(step, []).append(link)
-    wrong: set[Pair] = set()
+    against: dict[Pair, float] = {}
     for step, those in sorted(across.items()):
-        wrong.update(_contradicted(sequence, step, [link for link in those if link.pair not in wrong], links))
-    return {pair: link for pair, link in links.items() if pair not in wrong}
+        for link, margin in _minority(sequence, step, those, links):
+            share = margin / (place[link.second] - place[link.first])
+            against[link.pair] = against.get(link.pair, 0.0) + share
+    return against
 
 
-def _contradicted(
+def _minority(
     sequence: Sequence[ScanId], step: int, those: Sequence[Link], links: Mapping[Pair, Link]
-) -> Iterator[Pair]:
-    """Of the links across a step those that disagree with what more of them say."""
-    near = links_by_scan(link for link in links.values() if link not in those)
+) -> Iterator[tuple[Link, float]]:
+    """Of the links across a step those that disagree with what more of them say, and how much more."""
+    own = {link.pair for link in those}
+    around = {*sequence[max(0, step - SIDE) : step + 1 + SIDE]}
+    near = links_by_scan(link for pair, link in links.items() if pair not in own and pair[0] in around)
     before = placed_from(sequence[step], near, sequence[max(0, step - SIDE) : step + 1])
     after = placed_from(sequence[step + 1], near, sequence[step + 1 : step + 1 + SIDE])
     said = [
@@ -386,12 +405,10 @@ def _contradicted(
         if link.first in before and link.second in after
     ]
     support = [sum(w for _, other, w in said if _nearly(T, other)) for _, T, _ in said]
-    if not said:
-        return
-    winner = max(range(len(said)), key=lambda k: support[k])
+    winner = max(range(len(said)), key=lambda k: support[k], default=0)
     for k, (link, T, _) in enumerate(said):
         if not _nearly(T, said[winner][1]) and support[k] < support[winner]:
-            yield link.pair
+            yield link, support[winner] - support[k]
 
 
 def _weight(link: Link) -> float:
