@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from app.jobs import Backlog, Check, Latest, WarmUp
+from app.warm_up import warm_up
+from segmap import _bound_kernels, _search_kernels, _value_kernels
 from segmap.errors import CancelledError
 
 PATIENCE = 60.0
@@ -250,6 +252,13 @@ def test_warming_up_is_waited_for(tmp_path: Path) -> None:
     warm_up.wait()
     warm_up.close()
     assert (tmp_path / "done").exists()
+
+
+def test_what_only_large_searches_need_is_compiled_too() -> None:
+    """Bounds are used for many candidates only; small maps alone would leave their kernels to the first user."""
+    warm_up()
+    kernels = (_bound_kernels.paint, _search_kernels.look_up, _search_kernels.outlast, _value_kernels.crossing)
+    assert all(kernel.signatures for kernel in kernels)
 
 
 def test_a_failing_warm_up_is_told_and_survived(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
