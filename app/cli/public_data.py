@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from app.cli.options import Json, one_of
-from app.cli.output import print_json, print_table
+from app.cli.output import print_json
 from segmap import datasets as public
 
 __all__ = ["datasets"]
@@ -26,8 +26,9 @@ def list_them(as_json: Json = False) -> None:
     if as_json:
         print_json({"folder": str(public.folder()), "datasets": [_document(held) for held in public.DATASETS.values()]})
         return
-    rows = [(held.name, held.scans, held.beams, _here(held), held.title) for held in public.DATASETS.values()]
-    print_table(("name", "scans", "beams", "here", "what"), rows)
+    typer.echo(_row("name", "scans", "beams", "here", "what"))
+    for held in public.DATASETS.values():
+        typer.echo(_row(held.name, held.scans, held.beams, _here(held), held.title))
 
 
 @datasets.command()
@@ -44,6 +45,10 @@ def get(
 
 def _told(file: public.RemoteFile) -> None:
     typer.echo(f"segmap: fetching {file.url}", err=True)
+
+
+def _row(name: str, scans: object, beams: object, here: str, title: str) -> str:
+    return f"{name:<12} {scans:>5} {beams:>5} {here:>4}  {title}"
 
 
 def _here(held: public.Dataset) -> str:
