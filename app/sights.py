@@ -31,7 +31,7 @@ class Sights:
 
 def sights(map_1: SegmentMap, map_2: SegmentMap, T_1_2: Pose2, parameters: Parameters) -> Sights | None:
     """What lines of sight say of a candidate; None where a map knows of no scan."""
-    seen_1, seen_2 = sighting(map_1), sighting(map_2)
+    seen_1, seen_2 = (sighting(some, parameters.max_range) for some in (map_1, map_2))
     if seen_1 is None or seen_2 is None:
         return None
     found = classes(seen_1, seen_2, T_1_2, parameters)

@@ -73,7 +73,7 @@ def _beside(beam, step, sensor):  # type: ignore[no-untyped-def]
 
 @_compiled
 def _pieces(sighting, gap):  # type: ignore[no-untyped-def]
-    """The surface between neighbouring returns closer than ``gap``, each with the line over one more on either side."""
+    """The surface from return to return where it goes on, each with the line over one more on either side."""
     beams = sighting.beams
     pieces = np.empty((len(beams), 7))
     count = 0
@@ -96,7 +96,7 @@ def _pieces(sighting, gap):  # type: ignore[no-untyped-def]
 @_inlined
 def _joined(beams, a, b, gap):  # type: ignore[no-untyped-def]
     squared = (beams[a, 0] - beams[b, 0]) ** 2 + (beams[a, 1] - beams[b, 1]) ** 2
-    return 0.0 < squared < gap * gap  # false for NaN
+    return squared > 0.0 and (squared < gap * gap or beams[a, 5] > 0.0)  # false for NaN
 
 
 @_compiled

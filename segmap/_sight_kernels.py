@@ -48,8 +48,9 @@ class Sighting(NamedTuple):
     """(m, 3): x, y of returns in the map's frame, and the width of the beam there, metres, shared by the returns of
     as many sensors as saw that place"""
     beams: FloatArray
-    """(n, 5): of every beam of every sensor, x, y in the sensor's frame and range (NaN: no return), and the
-    least and the largest range of the surface around it, one beam before to two after (inf and -inf: none)"""
+    """(n, 6): of every beam of every sensor, x, y in the sensor's frame and range (NaN: no return), the least and
+    the largest range of the surface around it, one beam before to two after (inf and -inf: none), and 1 where
+    the surface goes on to the next beam's return however far that is, 0 otherwise"""
     sensors: FloatArray
     """(s, 8): cosine, sine, x, y of the sensor's pose; first angle, angle step; first beam, number of beams"""
     mean: float
@@ -80,7 +81,7 @@ def _wrapped(beam, sensors, s):  # type: ignore[no-untyped-def]
 
 @_compiled
 def _surface_distance(x, y, beam, beams, sensors, s, gap):  # type: ignore[no-untyped-def]
-    """Squared distance of a point from the surface seen around a beam: returns, joined where closer than ``gap``."""
+    """Squared distance of a point from the surface seen around a beam: returns, joined where it goes on."""
     nearest = np.inf
     for step in range(-1, 3):
         a = _wrapped(beam + step, sensors, s)
@@ -95,7 +96,7 @@ def _surface_distance(x, y, beam, beams, sensors, s, gap):  # type: ignore[no-un
         ex = beams[b, 0] - beams[a, 0]
         ey = beams[b, 1] - beams[a, 1]
         squared = ex * ex + ey * ey
-        if 0.0 < dx * ex + dy * ey < squared < gap * gap:
+        if 0.0 < dx * ex + dy * ey < squared and (squared < gap * gap or beams[a, 5] > 0.0):
             nearest = min(nearest, (dx * ey - dy * ex) ** 2 / squared)
     return nearest
 
@@ -249,7 +250,7 @@ def _surface_line(x, y, beam, beams, sensors, s, gate, gap, line):  # type: igno
         ex = beams[b, 0] - beams[a, 0]
         ey = beams[b, 1] - beams[a, 1]
         squared = ex * ex + ey * ey
-        if squared == 0.0 or squared > gap * gap:
+        if squared == 0.0 or (squared > gap * gap and beams[a, 5] == 0.0):
             continue
         dx = x - beams[a, 0]
         dy = y - beams[a, 1]
@@ -273,7 +274,7 @@ def _line_through(beam, beams, sensors, s, gap, line):  # type: ignore[no-untype
     after = _wrapped(beam + 2, sensors, s)
     if before >= 0 and _near(beams, before, a, gap):
         a = before
-    if after >= 0 and _near(beams, after, b, gap):
+    if after >= 0 and _near(beams, b, after, gap):
         b = after
     ex = beams[b, 0] - beams[a, 0]
     ey = beams[b, 1] - beams[a, 1]
@@ -285,7 +286,9 @@ def _line_through(beam, beams, sensors, s, gap, line):  # type: ignore[no-untype
 
 @_inlined
 def _near(beams, a, b, gap):  # type: ignore[no-untyped-def]
-    return (beams[a, 0] - beams[b, 0]) ** 2 + (beams[a, 1] - beams[b, 1]) ** 2 < gap * gap  # false for NaN
+    """Whether the surface goes on from one return to the next."""
+    squared = (beams[a, 0] - beams[b, 0]) ** 2 + (beams[a, 1] - beams[b, 1]) ** 2
+    return squared < gap * gap or beams[a, 5] > 0.0  # false for NaN
 
 
 @_compiled

@@ -162,7 +162,7 @@ def explain(
     crossings = _crossings(map_1, map_2, T_1_2, parameters)
     value = sum(pair.value for pair in pairs)
     told = Explanation(T_1_2, float(value), bool(crossings), pairs, chains, crossings)
-    seen_1, seen_2 = (sighting(some) if sights else None for some in (map_1, map_2))
+    seen_1, seen_2 = (sighting(some, parameters.max_range) if sights else None for some in (map_1, map_2))
     return told if seen_1 is None or seen_2 is None else _seen(told, (map_1, map_2), (seen_1, seen_2), parameters)
 
 

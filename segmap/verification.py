@@ -52,7 +52,7 @@ class Views:
 
 def views(map_1: SegmentMap, map_2: SegmentMap, parameters: Parameters) -> Views | None:
     """Two maps as their sensors saw them; None where one knows of no scan."""
-    seen_1, seen_2 = sighting(map_1), sighting(map_2)
+    seen_1, seen_2 = (sighting(some, parameters.max_range) for some in (map_1, map_2))
     if seen_1 is None or seen_2 is None:
         return None
     return Views(seen_1, seen_2, (field(seen_1, parameters), field(seen_2, parameters)))

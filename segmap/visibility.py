@@ -10,9 +10,10 @@ a corridor. What several scans of a map saw weighs as if one of them had seen it
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from segmap import _sight_kernels as kernels
 from segmap._sight_kernels import Sighting
@@ -40,6 +41,12 @@ WIDEST = 0.5
 """metres; no return weighs more"""
 SURFACE_GAP = 0.5
 """metres; two neighbouring returns closer than this are taken as one surface"""
+GRAZING_GAP = 4.0
+"""metres; and so are two closer than this, where a beam's neighbour shows that it grazes a wall:"""
+GRAZING_RATIO = 2.5
+"""the gap beside is at least this part of theirs,"""
+GRAZING_ACROSS = 0.04
+"""metres; and the return beyond it is this close to their line"""
 SAME_PLACE = 0.2
 """metres; returns of several scans of a map this close to a surface that others see are of that surface"""
 
@@ -67,9 +74,13 @@ class Evidence:
         return self.supported / total if total > 0.0 else 0.0
 
 
-def sighting(segment_map: SegmentMap) -> Sighting | None:
-    """What the scans of a map saw, in arrays; None where the map knows of no scan."""
-    sights = [sight for sight in segment_map.sights if np.isfinite(sight.scan.ranges).any()]
+def sighting(segment_map: SegmentMap, max_range: float | None = None) -> Sighting | None:
+    """What the scans of a map saw, in arrays; None where the map knows of no scan.
+
+    Returns beyond ``max_range`` metres are none.
+    """
+    sights = [_limited(sight, max_range) for sight in segment_map.sights]
+    sights = [sight for sight in sights if np.isfinite(sight.scan.ranges).any()]
     if not sights:
         return None
     points = np.concatenate([_points(sight) for sight in sights])
@@ -87,6 +98,12 @@ def sensors(sights: Sequence[Sight]) -> tuple[FloatArray, FloatArray]:
     return beams, np.array([_sensor(sight, start) for sight, start in zip(sights, starts, strict=False)])
 
 
+def _limited(sight: Sight, max_range: float | None) -> Sight:
+    if max_range is None or not (sight.scan.ranges > max_range).any():
+        return sight
+    return Sight(sight.T_map_sensor, replace(sight.scan, max_range=np.nextafter(max_range, np.inf)))
+
+
 def _points(sight: Sight) -> FloatArray:
     points, beams = sight.scan.returns()
     widths = np.minimum(sight.scan.ranges[beams] * abs(sight.scan.angle_step), WIDEST)
@@ -94,25 +111,42 @@ def _points(sight: Sight) -> FloatArray:
 
 
 def _beams(sight: Sight) -> FloatArray:
-    ranges, angles = sight.scan.ranges, sight.scan.angles
-    around = np.stack([_neighbour(ranges, step, sight.scan.all_round) for step in (-1, 0, 1, 2)])
+    ranges, angles, ring = sight.scan.ranges, sight.scan.angles, sight.scan.all_round
+    x, y = ranges * np.cos(angles), ranges * np.sin(angles)
+    around = np.stack([_neighbour(ranges, step, ring) for step in (-1, 0, 1, 2)])
     bulge = np.cos(min(abs(sight.scan.angle_step), np.pi) / 2.0)  # the line between two returns passes in front of both
     return np.column_stack(
         (
-            ranges * np.cos(angles),
-            ranges * np.sin(angles),
+            x,
+            y,
             ranges,
             bulge * np.fmin.reduce(around, axis=0, initial=np.inf),
             np.fmax.reduce(around, axis=0, initial=-np.inf),
+            _grazes(np.stack([_neighbour(x, step, ring) + 1j * _neighbour(y, step, ring) for step in (-1, 0, 1, 2)])),
         )
     )
 
 
-def _neighbour(ranges: FloatArray, step: int, ring: bool) -> FloatArray:
-    """The range of the beam ``step`` beams on, NaN beyond the last one."""
-    beams = np.arange(len(ranges)) + step
-    shifted = ranges[beams % len(ranges)]
-    return shifted if ring else np.where((beams >= 0) & (beams < len(ranges)), shifted, np.nan)
+def _grazes(around: NDArray[np.complex128]) -> FloatArray:
+    """1 where a wall at a grazing angle goes on from each beam's return to the next one's, 0 elsewhere, (n,).
+
+    The returns of one wall are the farther apart the farther away they are, each gap not much longer than the one
+    before; where the surface ends they jump. ``around`` (4, n): the places before, of, after and two after a beam.
+    """
+    before, chord, after = np.diff(around, axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        length = np.abs(chord)
+        goes_on = np.zeros(len(chord), bool)
+        for beside in (before * chord.conj() / length, after * chord.conj() / length):
+            goes_on |= (beside.real * GRAZING_RATIO > length) & (np.abs(beside.imag) < GRAZING_ACROSS)
+        return (goes_on & (length < GRAZING_GAP)).astype(np.float64)
+
+
+def _neighbour(entries: FloatArray, step: int, ring: bool) -> FloatArray:
+    """The entry of the beam ``step`` beams on, NaN beyond the last one."""
+    beams = np.arange(len(entries)) + step
+    shifted = entries[beams % len(entries)]
+    return shifted if ring else np.where((beams >= 0) & (beams < len(entries)), shifted, np.nan)
 
 
 def _sensor(sight: Sight, start: int) -> tuple[float, ...]:

@@ -215,6 +215,40 @@ def test_thinning_keeps_the_weight(most, share):
         assert few.sensors is seen.sensors
 
 
+def test_a_wall_at_a_grazing_angle_goes_on():
+    """Along a corridor returns lie metres apart, and what lies between them is supported: any shift is as good."""
+    world = simulated.corridor(2.0)
+    here, there = (alone(exact(world, Pose2(x, 1.0, 0.0), reach=14.0)) for x in (100.0, 100.7))
+    T_1_2 = Pose2(0.7, 0.0, 0.0)
+    _, found = classes(sighting(here), sighting(there), T_1_2, Parameters())
+    points = T_1_2 @ sighting(there).points[:, :2]
+    far = (points[:, 0] > 6.0) & (points[:, 0] < 11.0)
+    assert far.sum() > 6
+    assert (found[far] == SUPPORTED).all()
+
+
+def test_the_edge_of_a_thing_does_not_go_on_to_what_is_behind_it():
+    """A box before a wall, near and far: nothing is joined across the jump."""
+    for near in (0.4, 1.5, 4.0):
+        ranges = np.full(90, near + 2.5) / np.cos((np.arange(90) - 45.0) * DEGREE)
+        ranges[35:55] = near / np.cos((np.arange(35, 55) - 45.0) * DEGREE)
+        beams = sighting(alone(LaserScan(ranges, -math.pi / 4.0, DEGREE))).beams
+        assert not beams[[34, 54], 5].any()
+
+
+def test_returns_beyond_the_range_asked_for_are_none():
+    """max_range limits lines of sight as it limits segments: no point, no free space up to it."""
+    scan = exact(simulated.room(), HERE)
+    seen = sighting(alone(scan), 2.5)
+    assert len(seen.points) == (scan.ranges <= 2.5).sum()
+    assert np.isnan(seen.beams[scan.ranges > 2.5, 2]).all()
+    near = LaserScan(np.where(scan.ranges <= 2.5, scan.ranges, np.nan), scan.first_angle, scan.angle_step)
+    assert np.array_equal(seen.beams, sighting(alone(near)).beams, equal_nan=True)
+    assert sighting(alone(scan), 0.01) is None
+    for far in (None, 100.0):
+        assert np.array_equal(sighting(alone(scan), far).beams, sighting(alone(scan)).beams, equal_nan=True)
+
+
 # --- several sensors ------------------------------------------------------------------------------
 
 

@@ -49,13 +49,44 @@ def to_piece(point, a, b):
     return math.dist(point, a + min(1.0, max(0.0, share)) * (b - a)), share
 
 
-def to_surface(point, corners):
-    """Distance from the polyline of returns (None: none), joined where closer than the gap."""
-    known = [corner for corner in corners if corner is not None]
+def goes_on(scan, right, left):
+    """Whether the surface goes on between the returns of two neighbouring beams.
+
+    It does where they are near to each other; and along a wall at a grazing angle, where the return beyond one of
+    them lies on their line, not much nearer than they are to each other.
+    """
+    a, b = returned(scan, right), returned(scan, left)
+    if a is None or b is None or math.dist(a, b) == 0.0:
+        return False
+    if math.dist(a, b) < GAP:
+        return True
+    beyond = (returned(scan, beside(scan, right, -1)), a, b), (returned(scan, beside(scan, left, 1)), b, a)
+    return math.dist(a, b) < 4.0 and any(c is not None and in_a_row(c, near, far) for c, near, far in beyond)
+
+
+def in_a_row(c, near, far):
+    """Whether a return c goes before two others: at most 4 cm off their line, and not too near to the first."""
+    along = (far - near) / math.dist(near, far)
+    back = near - c
+    across = abs(along[0] * back[1] - along[1] * back[0])
+    return across < 0.04 and 2.5 * (along @ back) > math.dist(near, far)
+
+
+def beside(scan, beam, step):
+    """The next beam to the left (step 1) or to the right (-1); None where there is none."""
+    following = beam + (step if scan.angle_step > 0.0 else -step)
+    if scan.all_round:
+        return following % len(scan)
+    return following if 0 <= following < len(scan) else None
+
+
+def to_surface(point, scan, beams):
+    """Distance from the polyline through the returns of beams (None: none), joined where the surface goes on."""
+    known = [returned(scan, beam) for beam in beams if returned(scan, beam) is not None]
     distances = [math.dist(point, corner) for corner in known]
-    for a, b in pairwise(corners):
-        if a is not None and b is not None and 0.0 < math.dist(a, b) < GAP:
-            distances.append(to_piece(point, a, b)[0])
+    for right, left in pairwise(beams):
+        if right is not None and left is not None and goes_on(scan, right, left):
+            distances.append(to_piece(point, returned(scan, right), returned(scan, left))[0])
     return min(distances, default=math.inf)
 
 
@@ -68,7 +99,7 @@ def seen(sight, point, parameters):
     if beams[1] is None and beams[2] is None:
         return UNSEEN, min(clear)
     corners = [returned(sight.scan, beam) for beam in beams]
-    distance = to_surface(local, corners)
+    distance = to_surface(local, sight.scan, beams)
     clear.append(abs(distance - parameters.sight_tolerance))
     if distance <= parameters.sight_tolerance:
         return SUPPORTED, min(clear)
@@ -96,14 +127,13 @@ def classes(sights, points, parameters):
 def surface_line(scan, point, gate, reach=3):
     """The line of the surface nearest to a point, as (normal, offset, distance); and whether two are as near."""
     beams = around(scan, math.atan2(point[1], point[0]), reach + 1)
-    corners = [returned(scan, beam) for beam in beams]
     found = []
-    for k, (a, b) in enumerate(pairwise(corners)):
-        if a is None or b is None or not 0.0 < math.dist(a, b) <= GAP:
+    for right, left in pairwise(beams):
+        if right is None or left is None or not goes_on(scan, right, left):
             continue
-        distance, share = to_piece(point, a, b)
+        distance, share = to_piece(point, returned(scan, right), returned(scan, left))
         if -0.5 <= share <= 1.5 and distance < gate:
-            found.append((distance, beams[k], beams[k + 1]))
+            found.append((distance, right, left))
     if not found:
         return None, False
     found.sort()
@@ -114,12 +144,10 @@ def surface_line(scan, point, gate, reach=3):
 
 def line_through(scan, right, left):
     """The line through two neighbouring returns, over one more on either side where the surface goes on."""
-    a, b = returned(scan, right), returned(scan, left)
-    angle = scan.angles
-    before, after = around(scan, angle[right] - 1e-9, 1)[0], around(scan, angle[left] + 1e-9, 1)[1]
-    before, after = returned(scan, before), returned(scan, after)
-    first = before if before is not None and math.dist(before, a) < GAP else a
-    last = after if after is not None and math.dist(after, b) < GAP else b
+    before, after = beside(scan, right, -1), beside(scan, left, 1)
+    first = before if before is not None and goes_on(scan, before, right) else right
+    last = after if after is not None and goes_on(scan, left, after) else left
+    first, last = returned(scan, first), returned(scan, last)
     x, y = (last - first) / math.dist(first, last)
     return np.array([-y, x]), np.array([-y, x]) @ (first + last) / 2.0
 
@@ -158,9 +186,8 @@ def pieces(scan):
         left = (k + 1) % len(scan)
         if left == 0 and not scan.all_round:
             continue
-        a, b = returned(scan, k), returned(scan, left)
-        if a is not None and b is not None and 0.0 < math.dist(a, b) < GAP:
-            found.append((a, b, *line_through(scan, k, left)))
+        if goes_on(scan, k, left):
+            found.append((returned(scan, k), returned(scan, left), *line_through(scan, k, left)))
     return found
 
 
