@@ -16,6 +16,8 @@ from bags import ECHOES, FIRST, ROS_1, ROS_2, SCAN, laser_scan, multi_echo, rang
 
 from segmap.errors import LogError
 from segmap.logs import Limits, read_log, read_logs
+from segmap.logs.laser_messages import laser_record
+from segmap.logs.text import MalformedError
 
 KINDS = ("ros1", "ros1 BZ2", "ros1 LZ4", "SQLITE3", "SQLITE3 zstd", "MCAP", "MCAP zstd")
 Write = Callable[..., bytes]
@@ -262,3 +264,26 @@ def test_names_of_topics_are_only_text(write):
     content = write("MCAP", scans)
     log = read_log(content.replace(b"/scan", b"/\x1b<a>"))
     assert log.topic == "/\N{REPLACEMENT CHARACTER}<a>"
+
+
+@pytest.mark.parametrize("frame", ["", "l", "la", "las", "lase", "laser"])
+def test_either_end_may_come_first(frame):
+    """A message of ROS 2 says which end of a number comes first; texts of any length keep the numbers aligned."""
+    scan = laser_scan(ROS_2, 3)
+    scan.header.frame_id = frame
+    for little in (True, False):
+        message = bytes(ROS_2.serialize_cdr(scan, SCAN, little_endian=little))
+        record = laser_record("LaserScan", "cdr", message, "/scan", 1)
+        assert record.ranges.tolist() == ranges(3).astype(float).tolist()
+        assert (record.time, record.declared_range) == (1003.5, 30.0)
+
+
+def test_messages_that_are_none():
+    """A message of unknown beginnings, or that ends early anywhere, is refused in words."""
+    message = bytes(ROS_2.serialize_cdr(laser_scan(ROS_2, 3, FIRST[:4]), SCAN))
+    needed = len(message) - 4  # without the intensities, which nobody reads
+    for end in range(needed):
+        with pytest.raises(MalformedError, match="the message ends too early"):
+            laser_record("LaserScan", "cdr", message[:end], "/scan", 1)
+    with pytest.raises(MalformedError, match="not written in CDR"):
+        laser_record("LaserScan", "cdr", b"\x07" + message[1:], "/scan", 1)
