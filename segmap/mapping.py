@@ -8,7 +8,8 @@ from itertools import combinations, groupby, pairwise, product
 
 import numpy as np
 
-from segmap.graph import Optimised, optimise
+from segmap.fusion import fuse_all
+from segmap.graph import Optimised, components, optimise
 from segmap.graph.edges import Parts
 from segmap.keyframes import chained
 from segmap.links import Link, Pace
@@ -24,14 +25,17 @@ from segmap.loops import (
     promising,
     proposals,
 )
+from segmap.merging import Component
 from segmap.parameters import Parameters
 from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 from segmap.spreading import Matches, Pair, spread
 
-__all__ = ["WholeMap", "map_scans"]
+__all__ = ["WholeMap", "fused", "map_scans"]
 
+FIRM = ("accepted", "agreed", "closed", "tracked")
+"""links that bear a place out"""
 ROUNDS = 3
 """searches for closures, each from the poses the one before gave"""
 MOST_JOINING = 800
@@ -66,6 +70,31 @@ class WholeMap:
     def components(self) -> tuple[tuple[ScanId, ...], ...]:
         """The scans that hold together, the largest component first."""
         return tuple(sorted(self.optimised.components, key=lambda part: (-len(part), part)))
+
+    def weakly_held(self) -> dict[ScanId, str]:
+        """The scans whose place is not borne out by a verdict, and why: to be looked at by a person.
+
+        Parts of a component that hang together by accepted matches, but hang on the rest only by what neighbours
+        agreed on or what fits the robot's pace, may be where they are or not.
+        """
+        firm = [link for link, fate in zip(self.links, self.optimised.residuals, strict=True) if not fate.silenced]
+        parts = components([link.edge for link in firm if link.why in FIRM], self.poses)
+        home = {scan for whole in _blocks(parts, self.components) for scan in max(whole, key=len)}
+        return {
+            scan: f"{len(part)} scans from {part[0]} on hang on the rest by no accepted integration."
+            for part in parts
+            for scan in part
+            if scan not in home
+        }
+
+
+def _blocks(parts: Sequence[Sequence[ScanId]], wholes: Sequence[Sequence[ScanId]]) -> list[list[Sequence[ScanId]]]:
+    """The parts of each whole."""
+    number = {scan: i for i, whole in enumerate(wholes) for scan in whole}
+    blocks: list[list[Sequence[ScanId]]] = [[] for _ in wholes]
+    for part in parts:
+        blocks[number[part[0]]].append(part)
+    return blocks
 
 
 Told = Callable[[str, int, int], None]
@@ -104,6 +133,15 @@ def map_scans(
 
 def _nobody(what: str, done: int, total: int) -> None:
     """Nobody listens."""
+
+
+def fused(whole: WholeMap, maps: Mapping[ScanId, SegmentMap], parameters: Parameters) -> tuple[Component, ...]:
+    """The components of a whole map, the largest first, each as one clean map in the frame of its first scan."""
+    return tuple(
+        Component(f"component {number}", part, poses, fuse_all(maps, poses, parameters))
+        for number, part in enumerate(whole.components, start=1)
+        for poses in [{scan: whole.poses[scan] for scan in part}]
+    )
 
 
 @dataclass(frozen=True, eq=False)

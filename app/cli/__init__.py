@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from app.cli import benchmarking, evaluating, inspecting, integrating, merging, projects, public_data
+from app.cli import benchmarking, evaluating, inspecting, integrating, mapping, merging, projects, public_data
 from app.resources import program_version
 from segmap.errors import SegmapError
 
@@ -35,6 +35,7 @@ cli.command()(inspecting.info)
 cli.command()(inspecting.segments)
 cli.command()(integrating.integrate)
 cli.command()(merging.merge)
+cli.command("map")(mapping.map_logs)
 cli.command()(projects.export)
 cli.command()(projects.replay)
 cli.add_typer(public_data.datasets)
