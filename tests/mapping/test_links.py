@@ -71,7 +71,7 @@ def test_a_triangle_saves_a_doubtful_match_and_picks_its_candidate():
     )
     links = agreed(sequence, matches, pace_of(matches))
     assert (links[pair].why, links[pair].rank) == ("agreed", 2)
-    assert links[pair].T_1_2 == true
+    assert true == links[pair].T_1_2
 
 
 def test_one_accepted_match_against_many_is_left_out():
