@@ -45,7 +45,7 @@ AUTOMATIC = "automatic"
 """verified mode's own choice of heuristic: cheapest first, until the evidence is clear"""
 STAGES = ("extremes", "all")
 """what ``automatic`` tries in turn"""
-MOST_ANGLES = 2_000_000
+MOST_ANGLES = 500_000
 """pairs of angles; where a partial map has more, ``automatic`` does without ``all``"""
 DEFAULT_HEURISTIC = {"paper": "all", "verified": AUTOMATIC}
 """the heuristic of each mode where none is asked for"""
