@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, cast
 
+from app.claims import CLAIMED
 from app.errors import RequestError, UnknownError
 from app.review import Outcome
 from segmap.errors import ProjectError
-from segmap.events import Choice
-from segmap.integration import Match
+from segmap.events import Choice, Covariance
+from segmap.integration import Candidate, Match
+from segmap.links import covariance_of
 from segmap.pose import Pose2
-from segmap.project import ProjectState
+from segmap.project import ProjectState, Proposal
 
-__all__ = ["Evidence", "choose", "in_force"]
+__all__ = ["Evidence", "choose", "covariance_at", "in_force"]
 
 
 @dataclass(frozen=True)
@@ -22,20 +24,39 @@ class Evidence:
 
     T_1_2: Pose2
     value: float
-    rank: int
+    rank: int | None
+    """None: not one of those our search found, but a pose that was claimed"""
+    covariance: Covariance | None = None
 
     @classmethod
-    def of(cls, integration: str, rank: int, outcome: Outcome | None, match: Match | None) -> Evidence | None:
+    def of(
+        cls, integration: str, rank: int, outcome: Outcome | None, match: Match | None, claim: Proposal | None = None
+    ) -> Evidence | None:
         """The candidate of a rank; None where there is no transformation (yet).
 
         Raises:
             UnknownError: there are fewer candidates.
         """
-        if rank == 0:
-            return None if outcome is None or outcome.pose is None else cls(Pose2(*outcome.pose), outcome.value, 0)
+        if rank == 0 and outcome is not None and outcome.pose is not None:
+            return cls(Pose2(*outcome.pose), outcome.value, 0, outcome.covariance)
         if match is None or rank >= len(match.ranked):
+            if rank == 0:
+                return None
             raise UnknownError(f"{integration} has no candidate of rank {rank}: look at its candidates again.")
-        return cls(match.ranked[rank].T_1_2, match.ranked[rank].value, rank)
+        candidate = match.ranked[rank]
+        return cls(
+            candidate.T_1_2,
+            candidate.value,
+            None if candidate.index == CLAIMED else rank,
+            covariance_at(candidate, claim),
+        )
+
+
+def covariance_at(candidate: Candidate, claim: Proposal | None) -> Covariance | None:
+    """How well a candidate is known: as its match says, or as whoever claims it does; None: nobody says."""
+    if candidate.index == CLAIMED and claim is not None and claim.covariance is not None:
+        return claim.covariance
+    return None if candidate.uncertainty is None else covariance_of(candidate)
 
 
 def choose(
@@ -55,7 +76,7 @@ def choose(
     """
     if verdict not in ("accepted", "rejected"):
         raise RequestError(f"{verdict!r} is no verdict: say accepted or rejected.")
-    evidence = Evidence.of(integration, rank, outcome, match)
+    evidence = Evidence.of(integration, rank, outcome, match, state.proposals.get(integration))
     if evidence is None and verdict == "accepted":
         raise ProjectError(_why_not(integration, heuristic, outcome))
     return Choice(
@@ -67,6 +88,7 @@ def choose(
         T_1_2=evidence.T_1_2 if evidence else None,
         value=evidence.value if evidence else None,
         candidate=evidence.rank if evidence else None,
+        covariance=evidence.covariance if evidence else None,
     )
 
 

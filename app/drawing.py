@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from app import grid, map_layers, pair_layers
+from app.claims import CLAIMED
 from app.content import Content, Pair, merit
 from app.drawables import Box, Drawable, Frame, label, lines
 from app.palette import RGB
@@ -161,6 +162,8 @@ def _candidate_caption(pair: Pair) -> str:
 
 
 def _angle_caption(pair: Pair) -> str:
+    if pair.candidate is not None and pair.candidate.index == CLAIMED:
+        return "none: this pose was claimed by somebody else"
     if pair.candidate is not None and len({*pair.candidate.angle_1}) == 1:
         return "the two segments this candidate lays on each other, extreme on extreme"
     return "the two angles this candidate superimposes, vertex on vertex"

@@ -116,7 +116,6 @@ class Matching:
     def __init__(
         self,
         store: ResultStore,
-        integrations: Sequence[str],
         find: Callable[[str, str, Settings, Check], Match],
         *,
         told: Callable[[str, str], None],
@@ -124,10 +123,10 @@ class Matching:
         prepare: Callable[[Check], None] | None = None,
         workers: int = 1,
     ) -> None:
-        self._store, self._integrations, self._find, self._told = store, tuple(integrations), find, told
+        self._store, self._find, self._told = store, find, told
         self._lock = threading.RLock()
         self._settings: Settings | None = None
-        self._heuristic = ""
+        self._heuristic, self._integrations, self._listed = "", tuple[str, ...](), set[str]()
         self._keys: dict[str, str] = {}
         self._done = 0
         self._outcomes: dict[tuple[str, str], Outcome | None] = {}
@@ -145,19 +144,31 @@ class Matching:
         message = PREPARING if backlog.preparing else _message(done, total, backlog.running, backlog.cancelled)
         return Progress(done, total, backlog.running, backlog.cancelled, message)
 
-    def use(self, settings: Settings, heuristic: str) -> None:
-        """Find all matches by a heuristic under these settings; what was found under others is no longer shown."""
+    def use(self, settings: Settings, heuristic: str, integrations: Sequence[str]) -> None:
+        """Find the matches of some pairs by a heuristic under these settings; what was found under others is no
+        longer shown.
+        """
         keys = {name: settings.key(name) for name in heuristics(settings.mode)}
         with self._lock:
             self._settings = settings
-            if (keys, heuristic) == (self._keys, self._heuristic):
+            if (keys, heuristic, integrations) == (self._keys, self._heuristic, self._integrations):
                 return
             self._forget(name for name in {*keys, *self._keys} if keys.get(name) != self._keys.get(name))
-            self._keys, self._heuristic = keys, heuristic
+            self._keys, self._heuristic, self._integrations = keys, heuristic, tuple(integrations)
+            self._listed = set(integrations)
             self._recall(heuristic)
             missing = [id for id in self._integrations if self._outcomes[id, heuristic] is None]
             self._done = len(self._integrations) - len(missing)
             self._backlog.replace([self._task(id, heuristic) for id in missing])
+
+    def keep(self, matches: Mapping[str, Match], settings: Settings, heuristic: str) -> None:
+        """Take in matches that somebody else found under these settings; they are not looked for again."""
+        tasks = [Task(id, heuristic, settings.key(heuristic)) for id in matches]
+        new = [task for task in tasks if self._wanted(task) and self.match(task.integration, heuristic) is None]
+        outcomes = {task: Outcome.of(matches[task.integration]) for task in new}
+        self._store_results({task: (matches[task.integration], outcomes[task]) for task in new})
+        for task in new:
+            self._record(task, outcomes[task], matches[task.integration])
 
     def _forget(self, heuristics: Iterable[str]) -> None:
         gone = set(heuristics)
@@ -195,7 +206,8 @@ class Matching:
 
     def _recall(self, heuristic: str) -> None:
         """Read what the project file holds of a heuristic, in one go."""
-        places = {self._outcome_key(self._task(id, heuristic)): (id, heuristic) for id in self._integrations}
+        missing = [id for id in self._integrations if self._outcomes.get((id, heuristic)) is None]
+        places = {self._outcome_key(self._task(id, heuristic)): (id, heuristic) for id in missing}
         held = self._store.results(list(places))
         self._outcomes = dict.fromkeys(places.values()) | self._outcomes
         self._outcomes |= {places[key]: _outcome(text) for key, text in held.items()}
@@ -203,7 +215,7 @@ class Matching:
     def _work(self, task: Task, check: Check) -> None:
         with self._lock:
             settings = self._settings
-            if settings is None or not self._wanted(task):
+            if settings is None or not self._wanted(task) or self.match(task.integration, task.heuristic) is not None:
                 return
         try:
             match = self._find(task.integration, task.heuristic, settings, check)
@@ -220,7 +232,7 @@ class Matching:
     def _found(self, task: Task, match: Match) -> None:
         outcome = Outcome.of(match)
         if self._wanted(task):
-            self._store_result(task, match, outcome)
+            self._store_results({task: (match, outcome)})
         self._record(task, outcome, match)
 
     def _failed(self, task: Task, reason: str) -> None:
@@ -231,19 +243,22 @@ class Matching:
         with self._lock:
             if not self._wanted(task):
                 return
-            self._done += task.heuristic == self._heuristic and self._outcomes.get(place) is None
+            listed = task.integration in self._listed
+            self._done += listed and task.heuristic == self._heuristic and self._outcomes.get(place) is None
             self._outcomes[place] = outcome
             if match is not None:
                 self._keep(place, match)
-        self._told(*place)
+        if listed:
+            self._told(*place)
 
-    def _store_result(self, task: Task, match: Match, outcome: Outcome) -> None:
-        """Write a result to the cache; a cache that cannot be written costs time later, nothing else."""
+    def _store_results(self, found: Mapping[Task, tuple[Match, Outcome]]) -> None:
+        """Write results to the cache; a cache that cannot be written costs time later, nothing else."""
         try:
-            short = _OUTCOME.dump_json(outcome).decode()
-            self._store.put_results({self._match_key(task): match.to_json(), self._outcome_key(task): short})
+            full = {self._match_key(task): match.to_json() for task, (match, _) in found.items()}
+            short = {self._outcome_key(task): _OUTCOME.dump_json(one).decode() for task, (_, one) in found.items()}
+            self._store.put_results(full | short)
         except SegmapError as error:
-            log.warning("The match of %s was not kept: %s", task.integration, error)
+            log.warning("The matches of %d pairs were not kept: %s", len(found), error)
 
     def _wanted(self, task: Task) -> bool:
         """False for results that come after the parameters were changed."""
@@ -264,7 +279,7 @@ class Matching:
 
     @staticmethod
     def _outcome_key(task: Task) -> str:
-        return f"outcome/{task.key}/{task.integration}"
+        return f"outcome-2/{task.key}/{task.integration}"
 
 
 def _outcome(text: str | None) -> Outcome | None:

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from app.jobs import Check, Latest
+from app.posegraph import Solver, edges_of, placed
 from app.resources import program_version
 from app.review import THRESHOLDS
 from segmap.errors import CancelledError, ExportError, ProjectError, SegmapError
-from segmap.events import IntegrationId
 from segmap.export import RESOLUTION, Content
 from segmap.merging import Component, map_hash, merge_accepted
 from segmap.parameters import Parameters
-from segmap.project import ProjectState, accepted
+from segmap.project import ProjectState
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 
@@ -40,22 +40,28 @@ def map_parameters(parameters: Parameters) -> Parameters:
 
 
 def merge_project(
-    state: ProjectState, extractor: Extractor, previous: Merged | None = None, check: Check | None = None
+    state: ProjectState,
+    extractor: Extractor,
+    previous: Merged | None = None,
+    check: Check | None = None,
+    solve: Solver | None = None,
 ) -> Merged:
     """The map of everything accepted in a project, and of nothing else; scans nobody accepted are not in it.
 
-    What did not change since ``previous`` is taken from there, with the same result.
+    Scans are where the pose graph has them. What did not change since ``previous`` is taken from there, with the
+    same result.
     """
-    edges, parameters = accepted(state), map_parameters(state.parameters)
-    scans = sorted({scan for first, second, _ in edges for scan in (first, second)})
+    edges, parameters = edges_of(state), map_parameters(state.parameters)
+    optimised = (solve or Solver())(edges, check)
+    scans = sorted(optimised.poses)
     maps = {}
     for scan in scans:
         if check is not None:
             check()
         maps[scan] = extractor(scan, state.parameters)
     reusable = previous.components if previous and previous.parameters == parameters else ()
-    components = merge_accepted(maps, edges, state.parameters, previous=reusable, check=check)
-    integrations = tuple(str(IntegrationId(first, second)) for first, second, _ in edges)
+    components = merge_accepted(maps, placed(edges, optimised), state.parameters, previous=reusable, check=check)
+    integrations = tuple(edge.name for edge in edges)
     return Merged(state.revision, components, map_hash(components), parameters, integrations)
 
 
@@ -94,11 +100,12 @@ class MergedMap:
         self,
         state: Callable[[], ProjectState],
         extractor: Extractor,
+        solve: Solver,
         done: Callable[[Merged], None],
         failed: Callable[[str], None],
         prepare: Callable[[Check], None],
     ) -> None:
-        self._state, self._extractor, self._prepare = state, extractor, prepare
+        self._state, self._extractor, self._solve, self._prepare = state, extractor, solve, prepare
         self._done, self._failed = done, failed
         self._trouble = ""
         self.current = Merged()
@@ -125,7 +132,7 @@ class MergedMap:
     def _merge(self, check: Check) -> None:
         self._prepare(check)
         try:
-            self.current = merge_project(self._state(), self._extractor, self.current, check)
+            self.current = merge_project(self._state(), self._extractor, self.current, check, self._solve)
         except CancelledError:
             raise
         except SegmapError as error:

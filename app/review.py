@@ -8,15 +8,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from app.criterion import CRITERIA, Criterion
-from segmap.events import Decision, IntegrationId
+from app.pairs import kind_of
+from segmap.events import Covariance, Decision, IntegrationId
 from segmap.integration import Match, Verdict, findings_of
+from segmap.links import covariance_of
 from segmap.parameters import Parameters
 from segmap.pose import Pose2
 from segmap.project import ProjectState
 from segmap.scans import ScanId
 from segmap.verdict import Findings, judge
 
-__all__ = ["Flips", "Outcome", "Row", "Rows", "counts", "flips", "queue", "row"]
+__all__ = ["Fate", "Flips", "Outcome", "Row", "Rows", "counts", "flips", "queue", "row"]
 
 STATES = ("pending", "failed", "none", "matching", "accepted", "rejected")
 """In queue order: what a person can decide, what a person should know, what is not ready, what is done."""
@@ -42,12 +44,16 @@ class Outcome:
     """verified mode"""
     findings: Findings | None = None
     """verified mode: what speaks for and against the best candidate"""
+    covariance: Covariance | None = None
+    """verified mode: how well the best candidate is known"""
 
     @classmethod
     def of(cls, match: Match) -> Outcome:
         """The outcome of a match."""
         pose = None if match.T_1_2 is None else (match.T_1_2.x, match.T_1_2.y, match.T_1_2.theta)
-        found = match.confidence, findings_of(match)
+        best = match.best
+        known = None if best is None or best.uncertainty is None else covariance_of(best)
+        found = match.confidence, findings_of(match), known
         return cls(match.heuristic, match.value, pose, match.candidates, match.draws, match.milliseconds, "", *found)
 
     def verdict(self, parameters: Parameters) -> Verdict:
@@ -55,6 +61,20 @@ class Outcome:
         if self.pose is None:
             return Verdict.REJECTED
         return judge(self.value, self.findings, parameters)[0]
+
+
+@dataclass(frozen=True)
+class Fate:
+    """How far a pose of an integration is from where the graph of all accepted ones has it."""
+
+    translation: float
+    """metres"""
+    rotation: float
+    """radians, in [0, pi]"""
+    chi: float | None = None
+    """of what is accepted: the same in standard deviations"""
+    silenced: bool = False
+    """accepted, and the optimiser does not believe it"""
 
 
 @dataclass(frozen=True)
@@ -81,6 +101,16 @@ class Row:
     milliseconds: float | None = None
     who: str = ""
     reason: str = ""
+    kind: str = "neighbour"
+    """why the pair is here, one of ``pairs.KINDS``"""
+    residual: float | None = None
+    """metres; how far its pose is from where the graph has it, once that is known"""
+    turn: float | None = None
+    """radians; the same for its heading"""
+    chi: float | None = None
+    """standard deviations; the same, of what is accepted"""
+    silenced: bool = False
+    """accepted, and the optimiser does not believe it"""
 
     def to_json(self) -> dict[str, Any]:
         """The row as the pages get it."""
@@ -107,30 +137,47 @@ class Rows:
     """The rows of some integrations, each made again only when what it shows has changed."""
 
     def __init__(self, integrations: Iterable[str]) -> None:
-        self._blank = {id: Row(id, *IntegrationId.parse(id), "matching") for id in integrations}
+        self._blank: dict[str, Row] = {}
         self._made: dict[str, tuple[Outcome | None, Decision | None, tuple[Any, ...], Row]] = {}
+        self.add(integrations)
+
+    def add(self, integrations: Iterable[str]) -> None:
+        """Know these too; what was known once stays known, as somebody may still look at it."""
+        for id in integrations:
+            if id not in self._blank:
+                self._blank[id] = Row(id, *IntegrationId.parse(id), "matching")
 
     def __contains__(self, integration: str) -> bool:
         return integration in self._blank
 
-    def row(self, integration: str, state: ProjectState, outcome: Outcome | None) -> Row:
+    def row(self, integration: str, state: ProjectState, outcome: Outcome | None, fate: Fate | None = None) -> Row:
         """The row of an integration in a state of the project."""
-        decision, settings = state.decisions.get(integration), _settings(state)
+        decision, settings = state.decisions.get(integration), (*_settings(state, integration), fate)
         held = self._made.get(integration)
         if held and held[0] is outcome and held[1] is decision and held[2] == settings:
             return held[3]
-        made = self.tried(integration, state, outcome, state.parameters)
+        made = _fated(self.tried(integration, state, outcome, state.parameters), fate)
         self._made[integration] = outcome, decision, settings, made
         return made
 
     def tried(self, integration: str, state: ProjectState, outcome: Outcome | None, parameters: Parameters) -> Row:
         """The row as it would be under other thresholds; nothing is kept."""
-        return row(self._blank[integration], state.heuristic, outcome, state.decisions.get(integration), parameters)
+        blank = self._blank[integration]
+        blank = replace(blank, kind=kind_of(IntegrationId(blank.first, blank.second), state))
+        return row(blank, state.heuristic, outcome, state.decisions.get(integration), parameters)
 
 
-def _settings(state: ProjectState) -> tuple[Any, ...]:
-    """What a row shows of a project's settings."""
-    return state.heuristic, *(getattr(state.parameters, name) for name in THRESHOLDS)
+def _settings(state: ProjectState, integration: str) -> tuple[Any, ...]:
+    """What a row shows of a project's settings, and of who asked for it."""
+    proposal = state.proposals.get(integration)
+    thresholds = (getattr(state.parameters, name) for name in THRESHOLDS)
+    return state.heuristic, proposal.kind if proposal else "", *thresholds
+
+
+def _fated(found: Row, fate: Fate | None) -> Row:
+    if fate is None:
+        return found
+    return replace(found, residual=fate.translation, turn=fate.rotation, chi=fate.chi, silenced=fate.silenced)
 
 
 def _undecided(blank: Row, outcome: Outcome | None, parameters: Parameters) -> Row:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
+from app.bodies import Body, IntegrationId, Name, Rank, Revision, Scalar, Text
+from app.loop_schemas import GraphBody, SearchBody
 from app.review import Row
 
 __all__ = [
@@ -38,28 +40,16 @@ __all__ = [
     "ViewOpened",
 ]
 
-Text = Annotated[str, Field(max_length=10_000)]
-Name = Annotated[str, Field(max_length=255)]
-IntegrationId = Annotated[str, Field(max_length=64)]
-Revision = Annotated[int, Field(ge=0, le=2**53)]
-Rank = Annotated[int, Field(ge=0, le=2**31)]
-Scalar = bool | int | float | Name | None
-
-
-class _Body(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-
 # --- requests -------------------------------------------------------------------------------------
 
 
-class SampleChoice(_Body):
+class SampleChoice(Body):
     """Make a project of a sample."""
 
     sample: Name
 
 
-class Decisions(_Body):
+class Decisions(Body):
     """Decide integrations, all in one step that can be undone."""
 
     integrations: Annotated[list[IntegrationId], Field(min_length=1, max_length=100_000)]
@@ -74,14 +64,14 @@ class Decisions(_Body):
     """the revision the page shows: refused with 409 where somebody decided the same since"""
 
 
-class Turn(_Body):
+class Turn(Body):
     """Undo or redo."""
 
     who: Name = ""
     expected_revision: Revision | None = None
 
 
-class ParametersChange(_Body):
+class ParametersChange(Body):
     """Change parameters, from those in force or from a preset; change the heuristic, and the mode."""
 
     changes: Annotated[dict[Name, Scalar], Field(default_factory=dict, max_length=200)]
@@ -91,13 +81,13 @@ class ParametersChange(_Body):
     who: Name = ""
 
 
-class MatchingAction(_Body):
+class MatchingAction(Body):
     """Stop matching in the background, or go on with it."""
 
     action: Literal["cancel", "resume"]
 
 
-class Action(_Body):
+class Action(Body):
     """Something a view is asked to do."""
 
     action: Name
@@ -267,6 +257,8 @@ class Project(BaseModel):
     """scans without an accepted integration"""
     merging: bool
     """whether the merged map is being computed"""
+    search: SearchBody
+    graph: GraphBody
 
 
 class Integration(BaseModel):
@@ -286,6 +278,16 @@ class Integration(BaseModel):
     milliseconds: float | None
     who: str
     reason: str
+    kind: Literal["neighbour", "closure", "imported", "manual"]
+    """why the pair is in the queue"""
+    residual: float | None
+    """metres from where the pose graph has it"""
+    turn: float | None
+    """radians, the same"""
+    chi: float | None
+    """standard deviations, of what is accepted"""
+    silenced: bool
+    """accepted, and the optimiser does not believe it"""
 
     @classmethod
     def of(cls, row: Row) -> Integration:
@@ -316,6 +318,10 @@ class Detail(BaseModel):
 
     row: Integration
     match: dict[str, Any] | None
+    claimed: int | None
+    """rank of the candidate that was claimed, and not found by our match"""
+    told: list[str]
+    """what the pose graph, and whoever proposed the pair, say of it"""
     heuristics: list[HeuristicResult]
 
 

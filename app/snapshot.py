@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from app.claims import CLAIMED
 from app.content import Content, Pair
 from app.drawing import STAGES, Layer, layers
 from app.evidence import Evidence
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
     from app.session import Session
 
 __all__ = ["snapshot"]
+
+
+NOTHING = ("candidate", "value", "pose", "angles", "claimed", "above", "score", "behind", "evidence", "uncertainty")
+"""null where no candidate is shown"""
 
 
 def snapshot(session: Session, evidence: Evidence, looks: Looks, content: Content) -> dict[str, Any]:
@@ -73,14 +78,18 @@ def _candidate(content: Content) -> dict[str, Any]:
     pair = content.pair
     candidate = None if pair is None else pair.candidate
     if pair is None or candidate is None:
-        nothing = ("candidate", "value", "pose", "angles", "above", "score", "behind", "evidence", "uncertainty")
-        return {**dict.fromkeys(nothing), "candidates": 0 if pair is None else len(pair.ranked)}
+        nothing = ("candidate", "value", "pose", "angles", "claimed", "above", "score", "behind")
+        return {
+            **dict.fromkeys((*nothing, "evidence", "uncertainty")),
+            "candidates": 0 if pair is None else len(pair.ranked),
+        }
     return {
         "candidate": pair.rank,
         "candidates": len(pair.ranked),
         "value": candidate.value,
         "pose": _pose(candidate.T_1_2),
         "angles": [list(candidate.angle_1), list(candidate.angle_2)],
+        "claimed": candidate.index == CLAIMED,
         "above": _above(pair, candidate),
         "score": candidate.score,
         "behind": _behind(pair, candidate),

@@ -27,6 +27,7 @@ from app.picking import nearest
 from app.review import Row
 from app.snapshot import snapshot
 from segmap.errors import ProjectError
+from segmap.events import Decision
 from segmap.integration import heuristics
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ __all__ = ["View"]
 
 DOUBLE_CLICK_SECONDS = 0.35
 """a decision so soon after the last one was meant for the pair that has just gone"""
-RELEVANT = ("decision", "map", "parameters")
+RELEVANT = ("decision", "map", "graph", "parameters")
 """session events after which a view may look different"""
 
 
@@ -103,8 +104,14 @@ class View:
             raise UnknownError(f"The project has no integration {integration[:80]!r}.")
         decision = self.session.state.decisions.get(integration)
         heuristic = decision.heuristic if decision and decision.heuristic in self._heuristics else None
-        rank = (decision.candidate or 0) if decision else 0
+        rank = self._rank_of(integration, heuristic, decision) if decision else 0
         return replace(self._looks.at(integration, heuristic, rank), notice=notice)
+
+    def _rank_of(self, integration: str, heuristic: str | None, decision: Decision) -> int:
+        """The candidate that was decided on; a pose that was claimed has no rank of its own."""
+        match = None if decision.candidate is not None else self.session.match(integration, heuristic)
+        found = enumerate(match.ranked if match else ())
+        return next((rank for rank, one in found if one.T_1_2 == decision.T_1_2), decision.candidate or 0)
 
     def next(self) -> None:
         """The next integration of the queue; after the last comes the first."""
@@ -310,11 +317,10 @@ class View:
 
     def _turn_back(self, turn: Callable[..., Any], what: str | None, done: str) -> None:
         with self._acting:
-            before = self.session.state.decisions
-            turn(self.who)
-            after = self.session.state.decisions
-            changed = [id for id in self.session.integrations if before.get(id) != after.get(id)]
-            here = self._looks.integration
+            change = turn(self.who)
+            listed = set(self.session.integrations)
+            changed = [id for id in change.integrations if id in listed]
+            here = self._present(self._looks).integration
             target = here if here in changed or not changed else changed[0]
             looks = self._looks if target is None else self._at(target)
             self._look(replace(looks, notice=f"{done}: {what}."))
@@ -325,9 +331,16 @@ class View:
         with self._acting:
             self._look(replace(self._looks, **{"notice": "", **changes}))
 
+    def _present(self, looks: Looks) -> Looks:
+        """The same, or the first pair of the queue where the one looked at was taken out of it."""
+        if looks.integration is None or looks.integration in self.session.integrations:
+            return looks
+        rows = self.session.rows()
+        return looks.at(rows[0].id if rows else None)
+
     def _look(self, looks: Looks) -> None:
         """Look at something else, and tell everybody."""
-        self._looks = looks
+        self._looks = self._present(looks)
         self._tell()
 
     def _hear(self, event: Mapping[str, Any]) -> None:
@@ -338,7 +351,9 @@ class View:
 
     def _tell(self) -> None:
         """Have what is looked at computed where it is not known, and tell everybody what there is."""
-        looks = self._looks
+        looks = self._present(self._looks)
+        if looks is not self._looks:
+            self._looks = looks
         if looks.integration is not None and self._evidence.unknown(looks):
             self.session.request(looks.integration, self._evidence.heuristic(looks))
         self._seen = self.session.state.revision

@@ -16,6 +16,7 @@ from segmap.events import Choice, Decide, IntegrationId, fingerprint
 from segmap.export import Content, write_files
 from segmap.export.tum import left_out
 from segmap.integration import Match
+from segmap.links import covariance_of
 from segmap.parameters import Parameters
 from segmap.scans import LaserLog, ScanId
 from segmap.store import Store
@@ -83,4 +84,5 @@ def _choice(integration: IntegrationId, match: Match, parameters: Parameters) ->
         heuristic=match.heuristic,
         mode=match.mode,
         candidate=0,
+        covariance=None if match.best is None or match.best.uncertainty is None else covariance_of(match.best),
     )

@@ -20,7 +20,9 @@ from starlette.requests import Request
 
 from app.creation import Source
 from app.errors import UnknownError
+from app.loop_schemas import GraphBody, SearchBody
 from app.merged import exportable
+from app.pairs import pairs_in
 from app.routes.common import Opened, Site
 from app.schemas import (
     Component,
@@ -71,7 +73,7 @@ def projects(site: Site) -> ProjectList:
 def _summary(summary: Summary) -> ProjectSummary:
     state = summary.state or ProjectState(name=summary.path.stem)
     verdicts = Counter(decision.verdict for decision in state.decisions.values())
-    total = sum(max(0, log.scans - 1) for log in state.logs)
+    total = pairs_in(state)
     counts = Counts(total=total, **{v: verdicts[v] for v in ("accepted", "rejected")}, pending=total - verdicts.total())
     return ProjectSummary(
         id=summary.id,
@@ -190,6 +192,8 @@ def project(session: Opened) -> Project:
         components=[_component(part) for part in parts],
         unplaced=_unplaced(session, parts),
         merging=session.merging,
+        search=SearchBody(**session.loops.progress.to_json()),
+        graph=GraphBody(**session.loops.graph.to_json(), optimising=session.loops.optimising),
     )
 
 

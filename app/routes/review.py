@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
 
+from app.claims import CLAIMED, described
 from app.routes.common import Opened
 from app.schemas import (
     DecisionMade,
@@ -23,9 +24,9 @@ from app.schemas import (
     Turned,
 )
 from app.session import Change, Session
-from segmap.integration import heuristics
+from segmap.integration import Match, heuristics
 
-__all__ = ["router"]
+__all__ = ["made", "router"]
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["review"])
 
@@ -48,8 +49,16 @@ def integration(
     return Detail(
         row=Integration.of(row),
         match=None if match is None else json.loads(match.to_json()),
+        claimed=next((rank for rank, c in enumerate(match.ranked) if c.index == CLAIMED), None) if match else None,
+        told=_told(session, integration, match),
         heuristics=_heuristics(session, integration),
     )
+
+
+def _told(session: Session, integration: str, match: Match | None) -> list[str]:
+    proposal = session.state.proposals.get(integration)
+    said = [] if proposal is None else [described(match, proposal)]
+    return [*said, *session.loops.graph.explained(integration)]
 
 
 def _heuristics(session: Session, integration: str) -> list[HeuristicResult]:
@@ -79,7 +88,7 @@ def decide(session: Opened, body: Decisions) -> DecisionMade:
             who=body.who,
             expected_revision=body.expected_revision,
         )
-    return DecisionMade(**_made(session, change))
+    return DecisionMade(**made(session, change))
 
 
 @router.post("/undo")
@@ -87,7 +96,7 @@ def undo(session: Opened, body: Turn) -> Turned:
     """Take the last step back."""
     what = session.state.can_undo
     change = session.undo(body.who, expected_revision=body.expected_revision)
-    return Turned(**_made(session, change), undone=what)
+    return Turned(**made(session, change), undone=what)
 
 
 @router.post("/redo")
@@ -95,10 +104,11 @@ def redo(session: Opened, body: Turn) -> Turned:
     """Bring the step undone last back into force."""
     what = session.state.can_redo
     change = session.redo(body.who, expected_revision=body.expected_revision)
-    return Turned(**_made(session, change), redone=what)
+    return Turned(**made(session, change), redone=what)
 
 
-def _made(session: Session, change: Change) -> dict[str, Any]:
+def made(session: Session, change: Change) -> dict[str, Any]:
+    """What a step changed, as the pages get it."""
     state = change.state
     rows = [Integration.of(session.row(name)) for name in change.integrations[:200]]
     return {"revision": state.revision, "undo": state.can_undo, "redo": state.can_redo, "rows": rows}
@@ -110,7 +120,7 @@ def parameters(session: Opened, body: ParametersChange) -> DecisionMade:
     change = session.configure(
         body.changes, preset_name=body.preset, heuristic=body.heuristic, mode=body.mode, who=body.who
     )
-    return DecisionMade(**_made(session, change))
+    return DecisionMade(**made(session, change))
 
 
 @router.get("/threshold")

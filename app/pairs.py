@@ -1,0 +1,41 @@
+"""Which pairs of scans a project asks about, and why. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from segmap.events import IntegrationId
+from segmap.project import ProjectState
+from segmap.scans import ScanId
+
+__all__ = ["KINDS", "integrations_of", "kind_of", "pairs_in"]
+
+KINDS = ("neighbour", "closure", "imported", "manual")
+"""Why a pair is in the queue: its scans follow each other, our search found it, another program's pose graph holds
+it, or somebody asked for it."""
+
+
+def integrations_of(state: ProjectState, scan_ids: Sequence[ScanId]) -> tuple[str, ...]:
+    """All pairs of a project, in order: neighbours of each log, those proposed, and those decided anyway."""
+    pairs = {*_consecutive(scan_ids), *map(IntegrationId.parse, {*state.proposals, *state.decisions})}
+    return tuple(map(str, sorted(pairs)))
+
+
+def _consecutive(scan_ids: Sequence[ScanId]) -> Iterator[IntegrationId]:
+    return (IntegrationId(a, b) for a, b in pairwise(scan_ids) if a.log == b.log)
+
+
+def kind_of(integration: IntegrationId, state: ProjectState) -> str:
+    """Why a pair is asked about, one of ``KINDS``."""
+    first, second = integration
+    if first.log == second.log and second.scan == first.scan + 1:
+        return "neighbour"
+    proposal = state.proposals.get(str(integration))
+    return "manual" if proposal is None else proposal.kind
+
+
+def pairs_in(state: ProjectState) -> int:
+    """How many pairs a project asks about; no log is read for it."""
+    scans = [ScanId(log.index, i) for log in state.logs for i in range(log.scans)]
+    return len(integrations_of(state, scans))

@@ -1,0 +1,169 @@
+"""The pose graph over what is accepted: poses that fit all of it best, and how each integration fares in it."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from app.jobs import Check, Latest
+from app.review import Fate
+from segmap.events import Covariance, Decision, IntegrationId
+from segmap.graph import Edge, Optimised, Preview, Residual, Strength, Ways, explain, optimise, preview, strength
+from segmap.merging import Accepted
+from segmap.pose import Pose2
+from segmap.project import ProjectState
+
+__all__ = ["Graph", "PoseGraph", "Solver", "edge", "edges_of", "graph_of", "placed"]
+
+DEVIATION = 0.1, math.radians(2.0)
+"""metres and radians; what is taken for a pose nobody says how well it is known"""
+UNTOLD: Covariance = (
+    (DEVIATION[0] ** 2, 0.0, 0.0),
+    (0.0, DEVIATION[0] ** 2, 0.0),
+    (0.0, 0.0, DEVIATION[1] ** 2),
+)
+
+
+def edge(integration: str, T_1_2: Pose2, covariance: Covariance | None) -> Edge:
+    """An integration as an edge of the graph."""
+    pair = IntegrationId.parse(integration)
+    return Edge(pair.first, pair.second, T_1_2, covariance or UNTOLD)
+
+
+def edges_of(state: ProjectState) -> tuple[Edge, ...]:
+    """What is accepted, in the order of the scans."""
+    made = (_edge(decision) for decision in state.decisions.values() if decision.verdict == "accepted")
+    return tuple(sorted((one for one in made if one is not None), key=lambda one: (one.first, one.second)))
+
+
+def _edge(decision: Decision) -> Edge | None:
+    return None if decision.T_1_2 is None else edge(decision.integration, decision.T_1_2, decision.covariance)
+
+
+def placed(edges: tuple[Edge, ...], optimised: Optimised) -> tuple[Accepted, ...]:
+    """What is accepted as the graph has it: the poses of the merged map.
+
+    Where no loop is closed there is nothing to weigh: each integration is as it was accepted, to the last bit.
+    """
+    count = [-len(part) for part in optimised.components]
+    number = {scan: i for i, part in enumerate(optimised.components) for scan in part}
+    for one in edges:
+        count[number[one.first]] += 1
+    poses = optimised.poses
+
+    def fitted(one: Edge) -> Pose2:
+        closes = count[number[one.first]] >= 0  # a tree has one edge less than scans
+        return poses[one.first].inverse() @ poses[one.second] if closes else one.T_1_2
+
+    return tuple((one.first, one.second, fitted(one)) for one in edges)
+
+
+class Solver:
+    """Optimises edges, and remembers the last result: the graph and the merged map ask for the same. Thread-safe."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._held: tuple[tuple[Edge, ...], Optimised] | None = None
+
+    def __call__(self, edges: tuple[Edge, ...], check: Check | None = None) -> Optimised:
+        """The poses that fit the edges best; the same for the same edges."""
+        with self._lock:
+            if self._held is None or self._held[0] != edges:
+                self._held = edges, optimise(edges, check=check)
+            return self._held[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Graph:
+    """What the optimiser makes of the integrations accepted at a revision."""
+
+    revision: int
+    edges: tuple[Edge, ...]
+    optimised: Optimised
+    strengths: tuple[Strength, ...]
+    """of every component"""
+
+    @cached_property
+    def residuals(self) -> Mapping[str, Residual]:
+        """How each accepted integration fares, by name."""
+        return {residual.edge.name: residual for residual in self.optimised.residuals}
+
+    @cached_property
+    def _ways(self) -> Ways:
+        return self.optimised.ways()
+
+    def fate(self, integration: str, T_1_2: Pose2 | None) -> Fate | None:
+        """How far a pose of an integration is from where the graph has it; None where the graph says nothing."""
+        held = self.residuals.get(integration)
+        if held is not None and held.edge.T_1_2 == T_1_2:
+            return Fate(held.translation, held.rotation, held.chi, held.silenced)
+        pair = IntegrationId.parse(integration)
+        part = self.optimised.component_of(pair.first)
+        if T_1_2 is None or part is None or part != self.optimised.component_of(pair.second):
+            return None
+        poses = self.optimised.poses
+        return Fate(*T_1_2.distance(poses[pair.first].inverse() @ poses[pair.second]))
+
+    def explained(self, integration: str) -> tuple[str, ...]:
+        """What the graph says of an accepted integration, in words; nothing of others."""
+        residual = self.residuals.get(integration)
+        return () if residual is None else explain(self.optimised, residual, self._ways)
+
+    def preview(self, candidate: Edge) -> Preview:
+        """What would come of accepting one more integration, or of this one at another pose."""
+        others = tuple(one for one in self.edges if one.name != candidate.name)
+        return preview(others, candidate, self.optimised if len(others) == len(self.edges) else None)
+
+    def to_json(self) -> dict[str, Any]:
+        """As the pages get it: strength by component, and what is silenced, in words."""
+        silenced = [{"id": r.edge.name, "sentence": self.explained(r.edge.name)[0]} for r in self.optimised.silenced]
+        return {
+            "revision": self.revision,
+            "edges": len(self.edges),
+            "silenced": silenced,
+            "strengths": [_strength(one) for one in self.strengths],
+        }
+
+
+def _strength(one: Strength) -> dict[str, Any]:
+    return {
+        "first": str(one.scans[0]),
+        "scans": len(one.scans),
+        "edges": one.edges,
+        "bridges": [bridge.name for bridge in one.bridges],
+        "hanging": len(one.hanging),
+        "cut": [cut.name for cut in one.cut],
+        "cut_off": len(one.cut_off),
+        "softest": str(one.softest),
+        "deviation": one.deviation,
+    }
+
+
+def graph_of(state: ProjectState, solve: Solver, check: Check | None = None) -> Graph:
+    """The graph of everything accepted in a project."""
+    edges = edges_of(state)
+    optimised = solve(edges, check)
+    return Graph(state.revision, edges, optimised, strength(optimised))
+
+
+class PoseGraph:
+    """Keeps the graph of a project up to date, in a thread of its own."""
+
+    def __init__(self, state: Callable[[], ProjectState], solve: Solver, done: Callable[[], None]) -> None:
+        self._state, self._solve, self._done = state, solve, done
+        self.current = Graph(0, (), optimise(()), ())
+        self._latest = Latest(self._optimise, "optimising")
+        self.ask, self.settle, self.close = self._latest.ask, self._latest.settle, self._latest.close
+
+    @property
+    def busy(self) -> bool:
+        """Whether the graph is being optimised, or is about to be."""
+        return self._latest.busy
+
+    def _optimise(self, check: Check) -> None:
+        self.current = graph_of(self._state(), self._solve, check)
+        self._done()
