@@ -337,10 +337,11 @@ class Session(Steps):
         self._tell({"type": "graph", "revision": self.loops.graph.revision})
 
     def _take_closures(self, found: Found) -> str:
-        """Propose what a search found and the queue has not yet; keep what it matched."""
-        change = self.propose([c.proposal for c in found.closures], who=SEARCH, again=False)
-        listed = {id: found.matches[id] for id in self._integrations if id in found.matches}
-        self._matching.keep(listed, found.settings, found.heuristic)
+        """Keep what a search matched, and propose what it found and the queue has not yet."""
+        proposals = [closure.proposal for closure in found.closures]
+        wanted = {*self._integrations, *(proposal.integration for proposal in proposals)}
+        self._matching.keep({id: m for id, m in found.matches.items() if id in wanted}, found.settings, found.heuristic)
+        change = self.propose(proposals, who=SEARCH, again=False)
         return found.in_words(len(change.integrations))
 
     def _progressed(self) -> None:
