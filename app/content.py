@@ -20,7 +20,7 @@ from segmap.pose import FloatArray, Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 
-__all__ = ["Content", "Pair", "Placed", "merit", "place"]
+__all__ = ["Content", "Pair", "Placed", "Tie", "merit", "place"]
 
 GAP = 1.0
 """metres between things that have no relation to each other"""
@@ -79,6 +79,20 @@ class Pair:
         return Pose2(right - left + GAP, 0.0, 0.0)
 
 
+@dataclass(frozen=True)
+class Tie:
+    """An integration in the map: a line between the places of its two scans."""
+
+    integration: str
+    first: ScanId
+    second: ScanId
+    accepted: bool
+    """otherwise a closure somebody still has to decide on"""
+    chi: float | None = None
+    """standard deviations from where the graph has it, of what is accepted"""
+    silenced: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Placed:
     """A component of the merged map, where it is drawn."""
@@ -121,6 +135,8 @@ class Content:
     stage: str
     pair: Pair | None = None
     components: tuple[Component, ...] = ()
+    ties: tuple[Tie, ...] = ()
+    """what is accepted, and closures to be decided on"""
     scans: int = 0
     """of the whole project"""
     dimension: int = 2
@@ -140,6 +156,11 @@ class Content:
     def placed(self) -> tuple[Placed, ...]:
         """The components, where they are drawn."""
         return place(self.components, self.pair.scans if self.pair else ())
+
+    @cached_property
+    def places(self) -> Mapping[ScanId, Pose2]:
+        """Where each scan of the map is drawn."""
+        return {scan: placed.pose(scan) for placed in self.placed for scan in placed.component.scans}
 
     def map_of(self, source: str) -> SegmentMap | None:
         """The map that a Pick's source names, in its frame; None where it is not shown."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from app import grid, map_layers, pair_layers
+from app import graph_layers, grid, map_layers, pair_layers
 from app.claims import CLAIMED
 from app.content import Content, Pair, merit
 from app.drawables import Box, Drawable, Frame, label, lines
@@ -261,6 +261,10 @@ _KINDS = {
     "trajectory": _Kind(
         "Trajectory", "m", map_layers.trajectory, lambda _: "where the accepted scans were taken", _component_colours
     ),
+    "edges": _Kind("Integrations", "σ", graph_layers.edges, graph_layers.edges_caption, graph_layers.colours),
+    "closures": _Kind(
+        "Loop closures", "m", graph_layers.candidates, graph_layers.candidates_caption, _colours("first")
+    ),
     "grid": _Kind("Grid", "m", grid.draw, grid.caption, _colours("neutral")),
 }
 LAYERS = tuple(_KINDS)
@@ -293,7 +297,7 @@ LAYERS_OF: dict[str, dict[str, bool]] = {
         "grid": True,
     },
     "fused": {"fused": True, "first": True, "second": True, "returns": False, "sensors": True, "grid": True},
-    "map": {"map": True, "pair": True, "trajectory": True, "grid": True},
+    "map": {"map": True, "pair": True, "trajectory": True, "edges": True, "closures": True, "grid": True},
 }
 """The layers of each stage, and whether they are drawn where nobody said otherwise."""
 

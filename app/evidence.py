@@ -7,9 +7,10 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from app.content import Content, Pair
+from app.content import Content, Pair, Tie
 from app.drawing import LAYERS_OF
 from app.looks import Looks
+from app.review import Row
 from app.sights import sights
 from segmap.chains import matching_chains
 from segmap.fusion import fuse
@@ -33,6 +34,14 @@ def scan_name(scan: ScanId, state: ProjectState) -> str:
     if len(state.logs) < 2:
         return f"scan {scan.scan}"
     return f"{state.logs[scan.log].name}, scan {scan.scan}"
+
+
+def _is_tie(row: Row) -> bool:
+    return row.state == "accepted" or (row.state == "pending" and row.kind != "neighbour")
+
+
+def _tie(row: Row) -> Tie:
+    return Tie(row.id, row.first, row.second, row.state == "accepted", row.chi, row.silenced)
 
 
 def _found(match: Match) -> dict[str, Any]:
@@ -73,6 +82,7 @@ class Evidence:
             stage=looks.stage,
             pair=pair,
             components=tuple(self._session.components()) if looks.stage == "map" else (),
+            ties=tuple(map(_tie, filter(_is_tie, self._session.rows()))) if looks.stage == "map" else (),
             scans=len(self._session.scan_ids),
             dimension=looks.dimension,
             theme=looks.theme,

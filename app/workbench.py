@@ -20,6 +20,7 @@ from app.drawables import Pick
 from app.drawing import LAYERS, STAGES, Picture, draw, layers
 from app.errors import RequestError, UnknownError
 from app.evidence import Evidence
+from app.graph_layers import TIES
 from app.listeners import Listeners
 from app.looks import Looks
 from app.palette import THEMES
@@ -227,8 +228,16 @@ class View:
             self._change(fits=self._looks.fits + 1)
 
     def pick(self, x: float, y: float, reach: float) -> None:
-        """Look at the segment nearest to a place, at most ``reach`` metres away; at none if none is there."""
-        self._change(picked=nearest(self.picture(), float(x), float(y), float(reach)))
+        """Look at the segment nearest to a place, at most ``reach`` metres away; at none if none is there.
+
+        In the map, a click on the line of an integration selects it.
+        """
+        content = self.content()
+        picked = nearest(draw(content), float(x), float(y), float(reach))
+        if picked is not None and picked.source == TIES:
+            self.select(content.ties[picked.segment].integration)
+        else:
+            self._change(picked=picked)
 
     def set_picked(self, source: str | None, segment: int = 0) -> None:
         """Look at a segment: of ``first``, of ``second``, of a component of the map; None: at none."""

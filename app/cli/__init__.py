@@ -13,7 +13,17 @@ from typing import Annotated
 
 import typer
 
-from app.cli import benchmarking, evaluating, inspecting, integrating, mapping, merging, projects, public_data
+from app.cli import (
+    benchmarking,
+    evaluating,
+    inspecting,
+    integrating,
+    mapping,
+    merging,
+    projects,
+    public_data,
+    searching,
+)
 from app.resources import program_version
 from segmap.errors import SegmapError
 
@@ -38,6 +48,7 @@ cli.command()(merging.merge)
 cli.command("map")(mapping.map_logs)
 cli.command()(projects.export)
 cli.command()(projects.replay)
+cli.command()(searching.loops)
 cli.add_typer(public_data.datasets)
 cli.add_typer(benchmarking.benchmark)
 cli.command()(evaluating.evaluate)
