@@ -6,8 +6,9 @@
     EDGE_SE2 id id x y theta I11 I12 I13 I22 I23 I33           the information in the frame of the second scan
     FIX id                                                     the first scan of each component
 
-gtsam takes no more edges after a line it does not know, remarks and FIX included: they come last. An id is the number of the scan in its log where there is one log, else the scan's place in the table of
-time stamps, ``id,log,scan,time``.
+gtsam takes no more edges after a line it does not know, remarks and FIX included: they come last. An id is
+the number of the scan in its log where there is one log, else the scan's place in the table of time stamps,
+``id,log,scan,time``.
 """
 
 from __future__ import annotations

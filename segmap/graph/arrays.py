@@ -60,6 +60,15 @@ class EdgeArrays:
         """Some of the edges."""
         return EdgeArrays(self.first[chosen], self.second[chosen], self.measured[chosen], self.whitening[chosen])
 
+    def joined(self, others: EdgeArrays) -> EdgeArrays:
+        """These edges, and others after them."""
+        pairs = zip(vars(self).values(), vars(others).values(), strict=True)
+        return EdgeArrays(*(np.concatenate(pair) for pair in pairs))
+
+    def covariances(self) -> FloatArray:
+        """Of the residuals, (m, 3, 3)."""
+        return np.linalg.inv(self.whitening.transpose(0, 2, 1) @ self.whitening).astype(np.float64)
+
     def squares(self, poses: FloatArray) -> FloatArray:
         """The squared Mahalanobis distance of every edge, (m,)."""
         whitened = self.whitened(poses)
@@ -216,13 +225,19 @@ class System:
         matrix = csc_array((raised, self._rows, self._starts), shape=(self.size, self.size))
         return splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
+    def columns(self, entries: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+        """The normal matrix by columns: where each begins, the rows and the values of its entries."""
+        raised = entries.copy()
+        raised[self._diagonal] += RIDGE * entries[self._diagonal].max(initial=1.0)
+        return self._starts.astype(np.int64), self._rows.astype(np.int64), raised
+
     def by_pose(self, unknowns: FloatArray) -> FloatArray:
         """Motions of all poses, (n, 3), of a solution (size,)."""
         return np.concatenate((np.zeros((1, 3)), unknowns.reshape(-1, 3)[self._place[1:]]))
 
-    def unknowns_of(self, pose: int) -> IntArray:
-        """The three unknowns of a pose other than 0."""
-        return 3 * self._place[pose] + np.arange(3)
+    def unknowns_of(self, poses: IntArray) -> IntArray:
+        """The three unknowns of each of some poses other than 0, (k, 3)."""
+        return 3 * self._place[poses, None] + np.arange(3)
 
 
 def _elimination(edges: EdgeArrays, count: int) -> IntArray:

@@ -7,13 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from segmap.graph.least_squares import STEPS
-from segmap.graph.robust import Minimise, Problem, Round, reconsidered, settled
+from segmap.graph.robust import FIRST_STEPS, Minimise, Problem, Round, reconsidered, settled
 from segmap.pose import FloatArray
 
 __all__ = ["decided"]
 
-MANY = 0.05
-"""of the edges that can be silenced; where more are, another road is tried"""
 FINE = 5.0
 """standard deviations; where no edge is farther off, no better place is looked for"""
 
@@ -21,23 +19,25 @@ FINE = 5.0
 def decided(
     problem: Problem, minimise: Minimise, begin: Callable[[FloatArray], FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """Poses (n, 3) and weights (m,): the best of what is found from each start.
+    """Poses (n, 3) and weights (m,): the best of what is found on two roads, if all edges do not agree anyway.
 
-    ``begin`` is graduated non-convexity from some poses. It can end in a place that is worse than the one it
-    began from, where that was good or much is wrong: both are settled, and the smaller loss wins.
+    From a start whose errors are those of a chain, hearing silenced edges again, the surest first, finds the
+    best place; where wrong edges went into the start, the rounds of graduated non-convexity do, ``begin``.
     """
     if not len(problem.free):
         return _plain(problem, minimise)
-    found = []
-    for place, start in enumerate(problem.starts):
-        known = place < len(problem.starts) - 1
-        found.append(settled(problem, start if known else begin(start), minimise))
-        if found[-1][1].all():
-            break  # nothing contradicts anything
-        if known or (found[-1][1] == 0.0).sum() > MANY * len(problem.free):
-            found.append(settled(problem, begin(start) if known else start, minimise))
-    poses, weights = reconsidered(problem, *min(found, key=lambda one: problem.loss(one[0])), minimise)
+    every = np.ones(len(problem.edges))
+    agreed = minimise(problem.starts[0], every, FIRST_STEPS)
+    if (problem.edges.squares(agreed) <= problem.gate**2).all():
+        problem.tell(Round(problem.loss(agreed), 0, agreed))
+        return minimise(agreed, every, STEPS), every
+    found = [_from(problem, start, minimise) for start in (*problem.starts, begin(problem.starts[-1]))]
+    poses, weights = min(found, key=lambda one: problem.loss(one[0]))
     return minimise(poses, weights, STEPS), weights
+
+
+def _from(problem: Problem, poses: FloatArray, minimise: Minimise) -> tuple[FloatArray, FloatArray]:
+    return reconsidered(problem, *settled(problem, poses, minimise), minimise)
 
 
 def _plain(problem: Problem, minimise: Minimise) -> tuple[FloatArray, FloatArray]:

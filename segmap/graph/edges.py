@@ -14,7 +14,7 @@ from segmap.errors import GraphError
 from segmap.pose import FloatArray, Pose2
 from segmap.scans import ScanId
 
-__all__ = ["SOURCES", "Covariance", "Edge", "Parts", "components"]
+__all__ = ["SOURCES", "Covariance", "Edge", "Parts", "as_covariance", "components", "joined"]
 
 Covariance: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 """of x, y (metres) and theta (radians), rows and columns in this order"""
@@ -64,7 +64,7 @@ class Edge:
         turn = _turned(T_2_1.theta)
         turn[:2, 2] = -T_2_1.y, T_2_1.x  # an error of theta moves the other origin sideways
         covariance = turn @ np.array(self.covariance) @ turn.T
-        return replace(self, first=self.second, second=self.first, T_1_2=T_2_1, covariance=_as_tuple(covariance))
+        return replace(self, first=self.second, second=self.first, T_1_2=T_2_1, covariance=as_covariance(covariance))
 
 
 def _turned(theta: float) -> FloatArray:
@@ -72,7 +72,8 @@ def _turned(theta: float) -> FloatArray:
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _as_tuple(matrix: FloatArray) -> Covariance:
+def as_covariance(matrix: FloatArray) -> Covariance:
+    """A matrix (3, 3) as an edge keeps it."""
     a, b, c = ((float(row[0]), float(row[1]), float(row[2])) for row in matrix)
     return a, b, c
 
@@ -81,7 +82,7 @@ def _checked(covariance: ArrayLike, name: str) -> Covariance:
     matrix = np.asarray(covariance, np.float64)
     if matrix.shape != (3, 3):
         raise GraphError(f"The covariance of edge {name} has shape {matrix.shape} instead of (3, 3).")
-    a, b, c = _as_tuple(matrix)
+    a, b, c = as_covariance(matrix)
     if not math.isfinite(sum((*a, *b, *c))):
         raise GraphError(f"The covariance of edge {name} is not finite.")
     if max(abs(a[1] - b[0]), abs(a[2] - c[0]), abs(b[2] - c[1])) > ASYMMETRY * max(a[0], b[1], c[2]):

@@ -1,4 +1,4 @@
-"""How well the graph knows where a scan is, and where it is softest."""
+"""How well the graph knows where a scan is, how far another edge is from what it knows, and where it is softest."""
 
 from __future__ import annotations
 
@@ -9,15 +9,12 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse.linalg import SuperLU
 
+from segmap.graph import _inverse
 from segmap.graph.arrays import EdgeArrays, System, adjoints, composed, inverted, residuals, slopes, turns
-from segmap.pose import FloatArray
+from segmap.graph.start import ARM
+from segmap.pose import FloatArray, IntArray
 
 __all__ = ["Marginals", "Softness"]
-
-POWERS = 12
-"""rounds of power iteration; the softest motion stands out long before"""
-SUSPECTS = 8
-"""poses that the softest motion moves most, looked at exactly"""
 
 
 @dataclass(frozen=True)
@@ -33,39 +30,88 @@ class Softness:
 
 
 class Marginals:
-    """Covariances of the poses (n, 3) of one component at its optimum; only edges that count are given."""
+    """Covariances of the poses (n, 3) of one component at its optimum.
 
-    def __init__(self, edges: EdgeArrays, poses: FloatArray) -> None:
+    ``edges`` are those that count; of ``others`` it can be told how far they are from what those know.
+    """
+
+    def __init__(self, edges: EdgeArrays, poses: FloatArray, others: EdgeArrays | None = None) -> None:
         self._poses = poses
-        self._system = System(edges, len(poses))
+        every = edges if others is None else edges.joined(others)
+        self._system = System(every, len(poses))
+        self._others = others
+        weights = np.zeros(len(every))
+        weights[: len(edges)] = 1.0
+        self._entries, _ = self._system.equations(poses, weights)
 
-    @cached_property
-    def _factors(self) -> SuperLU:
-        entries, _ = self._system.equations(self._poses, np.ones(len(self._system.edges)))
-        return self._system.factorised(entries)
+    @property
+    def effort(self) -> int:
+        """About how many multiplications the inverse takes."""
+        starts, rows, _ = self._system.columns(self._entries)
+        return int((np.diff(_inverse.column_starts(starts, rows)) ** 2).sum())
 
     def between(self, a: int, b: int) -> FloatArray:
         """Covariance (3, 3) of x, y, theta of ``T_a_b``, in the frame of pose a."""
         T_b_a = composed(inverted(self._poses[b]), self._poses[a])
-        by_a = -adjoints(T_b_a[None])[0]
-        joint = self._joint(a, b)
-        slope = np.concatenate((by_a, np.eye(3)), axis=1)
+        slope = np.concatenate((-adjoints(T_b_a[None])[0], np.eye(3)), axis=1)
         turn = turns(inverted(T_b_a)[None, 2])[0]
-        covariance = turn @ slope @ joint @ slope.T @ turn.T
+        covariance = turn @ slope @ self._joint(a, b) @ slope.T @ turn.T
         return (covariance + covariance.T) / 2.0
 
-    def squared(self, edge: EdgeArrays) -> float:
-        """The squared Mahalanobis distance of one more edge, with the uncertainty of the graph and its own."""
-        (a,), (b,) = edge.first, edge.second
-        own = np.linalg.inv(edge.whitening[0].T @ edge.whitening[0])
-        slope = np.concatenate([by_end[0] for by_end in slopes(self._poses, edge)], axis=1)
-        left = residuals(self._poses, edge)[0]
-        return float(left @ np.linalg.solve(own + slope @ self._joint(int(a), int(b)) @ slope.T, left))
+    def of_all(self) -> FloatArray:
+        """Covariances (n, 3, 3) of x, y, theta of every pose in the frame of pose 0."""
+        every = np.arange(len(self._poses))
+        turn = turns(composed(inverted(self._poses[0]), self._poses)[:, 2])
+        return turn @ self._blocks(every, every) @ turn.transpose(0, 2, 1)
+
+    def softest(self) -> Softness:
+        """The pose least sure against pose 0."""
+        variances, directions = np.linalg.eigh(self.of_all()[:, :2, :2])
+        pose = int(np.argmax(variances[:, 1]))
+        x, y = directions[pose, :, 1]
+        return Softness(pose, math.sqrt(max(variances[pose, 1], 0.0)), math.atan2(y, x) % math.pi)
+
+    def surprise(self) -> tuple[FloatArray, FloatArray]:
+        """Of the others: squared Mahalanobis distances (k,), and how unsure the graph is of what they say, (k,).
+
+        The distances are with the uncertainty of both, graph and edge; the unsureness is the variance of a
+        point at the end of an arm, square metres.
+        """
+        if self._others is None:
+            return np.empty(0), np.empty(0)
+        left, (by_1, by_2) = residuals(self._poses, self._others), slopes(self._poses, self._others)
+        first, second = self._others.first, self._others.second
+        cross = by_1 @ self._blocks(first, second) @ by_2.transpose(0, 2, 1)
+        known = cross + cross.transpose(0, 2, 1)
+        for slope, pose in ((by_1, first), (by_2, second)):
+            known += slope @ self._blocks(pose, pose) @ slope.transpose(0, 2, 1)
+        both = known + self._others.covariances()
+        squared = np.einsum("ei,ei->e", left, np.linalg.solve(both, left[:, :, None])[:, :, 0])
+        return squared, known[:, 0, 0] + known[:, 1, 1] + ARM**2 * known[:, 2, 2]
+
+    def _blocks(self, first: IntArray, second: IntArray) -> FloatArray:
+        """Covariances (k, 3, 3) of small motions of pairs of poses that an edge joins, or of a pose with itself."""
+        blocks = np.zeros((len(first), 3, 3))
+        known = (first > 0) & (second > 0)
+        rows, columns = (self._system.unknowns_of(poses[known]) for poses in (first, second))
+        rows, columns = np.repeat(rows, 3, axis=1), np.tile(columns, 3)
+        found = _inverse.looked_up(*self._inverted, rows.ravel(), columns.ravel())
+        blocks[known] = found.reshape(-1, 3, 3)
+        return blocks
+
+    @cached_property
+    def _inverted(self) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+        begins, below, factors, diagonal = _inverse.factorise(*self._system.columns(self._entries))
+        return begins, below, *_inverse.invert(begins, below, factors, diagonal)
+
+    @cached_property
+    def _factors(self) -> SuperLU:
+        return self._system.factorised(self._entries)
 
     def _joint(self, a: int, b: int) -> FloatArray:
-        """Covariance (6, 6) of small motions of two poses, each in its own frame."""
+        """Covariance (6, 6) of small motions of any two poses, each in its own frame."""
         joint = np.zeros((6, 6))
-        asked = [(3 * i, self._system.unknowns_of(pose)) for i, pose in enumerate((a, b)) if pose]
+        asked = [(3 * i, self._system.unknowns_of(np.array([pose]))[0]) for i, pose in enumerate((a, b)) if pose]
         for place, unknowns in asked:
             columns = np.zeros((self._system.size, 3))
             columns[unknowns, range(3)] = 1.0
@@ -73,23 +119,3 @@ class Marginals:
             for other, rows in asked:
                 joint[other : other + 3, place : place + 3] = solved[rows]
         return joint
-
-    def softest(self) -> Softness:
-        """The pose least sure against pose 0, of those that the softest motion of the whole moves most."""
-        moved = self._softest_motion()
-        suspects = np.argsort(-moved, kind="stable")[:SUSPECTS]
-        return max((self._softness(int(pose)) for pose in sorted(suspects)), key=lambda one: one.deviation)
-
-    def _softest_motion(self) -> FloatArray:
-        """How far each pose moves, (n,), in the motion the graph resists least."""
-        motion = np.tile((1.0, 0.5, 0.0), len(self._poses) - 1)
-        for _ in range(POWERS):
-            motion = self._factors.solve(motion)
-            motion[2::3] = 0.0  # places alone are asked for
-            motion /= np.linalg.norm(motion)
-        return np.hypot(*self._system.by_pose(motion)[:, :2].T)
-
-    def _softness(self, pose: int) -> Softness:
-        variances, directions = np.linalg.eigh(self.between(0, pose)[:2, :2])
-        heading = math.atan2(directions[1, 1], directions[0, 1]) % math.pi
-        return Softness(pose, math.sqrt(variances[1]), heading)

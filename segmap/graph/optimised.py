@@ -78,6 +78,17 @@ class Optimised:
         return sum(one.weight * one.chi**2 for one in self.residuals)
 
     @property
+    def variance_factor(self) -> float | None:
+        """How many times larger the variances of the edges are than these say, by their residuals.
+
+        1 where covariances tell the truth, less where they are too careful. None where nothing is left over to
+        tell by: as many edges as it takes to hold the scans.
+        """
+        kept = sum(not one.silenced for one in self.residuals)
+        spare = 3 * (kept - len(self.poses) + len(self.components))
+        return self.error / spare if spare > 0 else None
+
+    @property
     def silenced(self) -> tuple[Residual, ...]:
         """The edges the robust kernel takes for wrong."""
         return tuple(one for one in self.residuals if one.silenced)

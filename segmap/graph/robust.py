@@ -27,15 +27,16 @@ ROUNDS = 100
 FIRST_STEPS = 5
 """of least squares with every edge; the rounds go on from there with one step each"""
 SETTLING = 20
-STEPS = 5
+STEPS = 2
 """of least squares after each change of mind when settling"""
 DECIDED = 0.1
 """weights nearer to 0 or 1 than this are; settling does the rest"""
-HEARINGS = 20
-"""silenced edges that may count again one after the other"""
-HEARD = 12
+HEARINGS = 40
+"""times silenced edges are asked"""
+HEARD = 1000
 """silenced edges, the nearest to the gate, that are asked each time"""
-
+MOST_EFFORT = 300_000_000
+"""multiplications that asking may take; where it would take more, fewer edges are asked"""
 
 Minimise: TypeAlias = Callable[[FloatArray, FloatArray, int], FloatArray]
 """Poses, weights of the edges and a number of steps -> poses nearer to the minimum of the weighted squares."""
@@ -134,30 +135,36 @@ def reconsidered(
     """Poses and weights after silenced edges got a second hearing.
 
     An edge can be beyond the gate only because the graph went without it. What it costs to let it count is
-    its squared distance with the uncertainty of both, graph and edge; where that is within the gate, it counts.
+    its squared distance with the uncertainty of both, graph and edge: where that is within the gate it may
+    count. Those of which the graph is surest are tried first, half of them at a time, as they cannot be right
+    by chance; what follows from them decides on the rest.
     """
-    loss = problem.loss(poses)
+    loss, share = problem.loss(poses), 1.0
     for _ in range(HEARINGS):
-        place = _wronged(problem.edges, poses, weights, problem.gate)
-        if place is None:
+        wronged = _wronged(problem, poses, weights)
+        if not len(wronged):
             break
+        share /= 2.0
         again = weights.copy()
-        again[place] = 1.0
+        again[wronged[: max(1, round(share * len(wronged)))]] = 1.0
         result = settled(problem, minimise(poses, again, STEPS), minimise)
         new_loss = problem.loss(result[0])
-        if new_loss >= loss:
+        if new_loss < loss:
+            loss, share, (poses, weights) = new_loss, 1.0, result
+        elif share * len(wronged) < 1.0:
             break
-        loss, (poses, weights) = new_loss, result
     return poses, weights
 
 
-def _wronged(edges: EdgeArrays, poses: FloatArray, weights: FloatArray, gate: float) -> int | None:
-    """The silenced edge that would cost least, of those within the gate; None where there is none."""
+def _wronged(problem: Problem, poses: FloatArray, weights: FloatArray) -> IntArray:
+    """Silenced edges that are within the gate with the uncertainty of the graph, the surest first."""
     silenced = np.flatnonzero(weights <= 0.0)
-    if not len(silenced):
-        return None
-    heard = silenced[np.argsort(edges.squares(poses)[silenced], kind="stable")[:HEARD]]
-    graph = Marginals(edges.subset(np.flatnonzero(weights > 0.0)), poses)
-    costs = [graph.squared(edges.subset(heard[i : i + 1])) for i in range(len(heard))]
-    least = int(np.argmin(costs))
-    return int(heard[least]) if costs[least] <= gate**2 else None
+    heard = silenced[np.argsort(problem.edges.squares(poses)[silenced], kind="stable")[:HEARD]]
+    counting = problem.edges.subset(np.flatnonzero(weights > 0.0))
+    graph = Marginals(counting, poses, problem.edges.subset(heard))
+    while len(heard) > 1 and graph.effort > MOST_EFFORT:
+        heard = heard[: len(heard) // 2]
+        graph = Marginals(counting, poses, problem.edges.subset(heard))
+    squared, unsure = graph.surprise()
+    order = np.argsort(unsure, kind="stable")
+    return heard[order[squared[order] <= problem.gate**2]]

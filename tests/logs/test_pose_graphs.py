@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import gzip
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from graphs import far_apart
 
 from segmap.errors import LogError
-from segmap.graph import imported_edges, optimise
+from segmap.graph import Edge, imported_edges, optimise
 from segmap.logs import Limits, holds_pose_graph, read_log, read_pose_graph
 from segmap.logs.pose_graphs import PoseGraphFile
 from segmap.pose import Pose2
@@ -232,3 +233,23 @@ def test_real_graph_logs(datasets, name, vertices, edges, loops):
     assert result.silenced == ()
     first = log[0].logged_pose.inverse()
     assert far_apart(result.poses, {scan: first @ log[scan.scan].logged_pose for scan in result.poses})[0] < 0.25
+
+
+def test_wrong_closures_in_a_real_graph(datasets):
+    """A hundred wrong closures in a real graph, random and slid along: all are silenced, from no initial poses."""
+    graph = read_pose_graph(datasets / "fr079" / "fr079-graph.log.gz")
+    scans = {vertex.id: ScanId(0, place) for place, vertex in enumerate(graph.vertices)}
+    factor = optimise(imported_edges(graph, scans)).variance_factor
+    edges = imported_edges(graph, scans, scale=factor)
+    loops = imported_edges(graph, scans, scale=factor, loops=True)
+    rng, wrong = np.random.default_rng(0), []
+    for _ in range(50):
+        a, b = rng.choice(len(scans), 2, replace=False)
+        T = Pose2(*rng.uniform(-5.0, 5.0, 2), rng.uniform(-3.0, 3.0))
+        wrong.append(Edge(ScanId(0, int(a)), ScanId(0, int(b)), T, loops[0].covariance))
+        right = loops[rng.integers(len(loops))]
+        slide = rng.choice((-1.0, 1.0)) * rng.uniform(0.5, 3.0)
+        wrong.append(replace(right, T_1_2=Pose2(right.T_1_2.x + slide, right.T_1_2.y, right.T_1_2.theta)))
+    clean, mixed = optimise(edges), optimise([*edges, *wrong])
+    assert all(residual.silenced for residual in mixed.residuals[len(edges) :])
+    assert far_apart(mixed.poses, clean.poses)[0] < 0.01
