@@ -26,8 +26,7 @@ class LeastSquares:
     def __init__(self, edges: EdgeArrays, count: int, check: Callable[[], None] | None = None) -> None:
         self.edges, self.count = edges, count
         self._check = check or (lambda: None)
-        self._chosen: IntArray = np.arange(0)
-        self._system: System | None = None
+        self._held: tuple[IntArray, System] = np.arange(0), System(edges.subset(np.arange(0)), 1)
 
     def minimised(self, poses: FloatArray, weights: FloatArray, steps: int = STEPS) -> FloatArray:
         """Poses (n, 3) nearer to the minimum of the weighted sum of squares; pose 0 stays.
@@ -46,12 +45,10 @@ class LeastSquares:
     def _laid_out(self, weights: FloatArray) -> tuple[System, FloatArray]:
         """Equations that hold every edge of a weight above zero, and the weights of the edges they hold."""
         alive = np.flatnonzero(weights > 0.0)
-        fits = self._system is not None and len(alive) >= SPARSER * len(self._chosen)
-        if not (fits and np.isin(alive, self._chosen, assume_unique=True).all()):
-            self._chosen = alive
-            self._system = System(self.edges.subset(alive), self.count)
-        assert self._system is not None
-        return self._system, weights[self._chosen]
+        chosen, system = self._held
+        if len(alive) < SPARSER * len(chosen) or not np.isin(alive, chosen, assume_unique=True).all():
+            chosen, system = self._held = alive, System(self.edges.subset(alive), self.count)
+        return system, weights[chosen]
 
 
 def _stepped(
