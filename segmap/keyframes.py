@@ -44,6 +44,8 @@ RETURNS = 90
 """returns of each scan that judge what is voted for"""
 FASTER_TURN = 0.5
 """share of the score of a faster turn below which what is in pace is given up for it"""
+FEW = 3
+"""accepted matches across a step that bear it out where the two scans beside it were not matched"""
 SPARSE = 1.0 / 3.0
 """where more than this share of the scans would be keyframes, all are"""
 
@@ -191,19 +193,29 @@ def _bridge(
     workers: int,
     check: Callable[[], None] | None,
 ) -> None:
-    """Let the scans on both sides of each gap vote on the step across it."""
+    """Let the scans on both sides of each gap, and of each step that hangs on little, vote on the step."""
+    place = {key: i for i, key in enumerate(keys)}
     for i in range(1, len(keys)):
-        near = links_by_scan(links.values())
-        around = keys[max(0, i - 2 * SIDE) : i + 2 * SIDE]
-        if keys[i] in placed_from(keys[i - 1], near, around):
+        across = [link for link in links.values() if place[link.first] < i <= place[link.second]]
+        near = links_by_scan(link for link in links.values() if link not in across)
+        if across and not _hangs_on_little(across, keys[i - 1 : i + 1]):
             continue
         before = placed_from(keys[i - 1], near, keys[max(0, i - SIDE) : i])
         after = placed_from(keys[i], near, keys[i : i + SIDE])
         pairs = [(a, b) for a in before for b in after if (a, b) not in matches]
         matches.update(spread(maps, pairs, parameters, workers=workers, check=check))
-        if consensus := _across(maps, keys[i - 1 : i + 1], before, after, matches, pace, parameters):
-            for vote in consensus.votes:
-                links[vote.pair] = Link.of(vote.pair, matches[vote.pair], vote.rank, "voted")
+        consensus = _across(maps, keys[i - 1 : i + 1], before, after, matches, pace, parameters)
+        for link in across:
+            del links[link.pair]
+        for vote in consensus.votes if consensus else ():
+            links[vote.pair] = Link.of(vote.pair, matches[vote.pair], vote.rank, "voted")
+
+
+def _hangs_on_little(across: Sequence[Link], ends: Sequence[ScanId]) -> bool:
+    """Whether a step between two keyframes is borne out neither by a match of the two nor by several others."""
+    if any(link.pair == tuple(ends) for link in across):
+        return False
+    return sum(link.why == "accepted" for link in across) < FEW
 
 
 def _across(
