@@ -12,6 +12,8 @@ from segmap.pose import FloatArray
 
 __all__ = ["decided"]
 
+MANY = 0.05
+"""of the edges that can be silenced; where more are, the poses that were given are taken for wrong"""
 FINE = 5.0
 """standard deviations; where no edge is farther off, no better place is looked for"""
 
@@ -23,6 +25,7 @@ def decided(
 
     From a start whose errors are those of a chain, hearing silenced edges again, the surest first, finds the
     best place; where wrong edges went into the start, the rounds of graduated non-convexity do, ``begin``.
+    Poses that were given are relied on unless much is silenced from there.
     """
     if not len(problem.free):
         return _plain(problem, minimise)
@@ -31,13 +34,20 @@ def decided(
     if (problem.edges.squares(agreed) <= problem.gate**2).all():
         problem.tell(Round(problem.loss(agreed), 0, agreed))
         return minimise(agreed, every, STEPS), every
-    found = [_from(problem, start, minimise) for start in (*problem.starts, begin(problem.starts[-1]))]
+    found = [_from(problem, start, minimise) for start in (problem.starts[0], begin(problem.starts[0]))]
+    if len(problem.starts) > 1 and min(_silenced(weights) for _, weights in found) > MANY * len(problem.free):
+        others = problem.starts[-1], begin(problem.starts[-1])
+        found += [_from(problem, start, minimise) for start in others]
     poses, weights = min(found, key=lambda one: problem.loss(one[0]))
     return minimise(poses, weights, STEPS), weights
 
 
 def _from(problem: Problem, poses: FloatArray, minimise: Minimise) -> tuple[FloatArray, FloatArray]:
     return reconsidered(problem, *settled(problem, poses, minimise), minimise)
+
+
+def _silenced(weights: FloatArray) -> int:
+    return int((weights == 0.0).sum())
 
 
 def _plain(problem: Problem, minimise: Minimise) -> tuple[FloatArray, FloatArray]:
