@@ -68,4 +68,6 @@ def described(match: Match | None, proposal: Proposal) -> str:
     if own is None:
         return f"{said}; our own match finds nothing to compare it with."
     distance, turn = own.T_1_2.distance(proposal.T_1_2)
+    if max(distance, turn) <= SAME:
+        return f"{said}."
     return f"{said}; our own match is {distance:.2f} m and {math.degrees(turn):.1f} degrees from the pose it claims."

@@ -51,7 +51,7 @@ def candidates(content: Content) -> Iterator[Drawable]:
     """Closures somebody still has to decide on."""
     those = [(i, tie) for i, tie in _placed(content) if not tie.accepted]
     if those:
-        yield _dashed("closures", "closures", content, those, content.palette.first, 9, 1.5)
+        yield _dashed("closures", "closures", content, those, content.palette.faint(content.palette.first, 0.6), 9, 1.2)
 
 
 def _selected(content: Content) -> Iterator[Drawable]:

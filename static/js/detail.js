@@ -2,6 +2,7 @@
 
 import { byId, fill, h, icon, setIcon, text } from "./dom.js";
 import { measured, pair } from "./format.js";
+import { off } from "./graph.js";
 import { stateIcon, stateLabel } from "./queue.js";
 
 const PATIENCE = 300;
@@ -16,6 +17,7 @@ export class Detail {
     view.addEventListener("changed", () => this.#follow());
     project.addEventListener("match", ({ detail }) => this.#shown && detail.integration === view.integration && this.load());
     project.addEventListener("parameters", () => this.#forget());
+    project.addEventListener("graph", () => this.#shown && this.load());
     project.addEventListener("rows", () => this.#head());
   }
 
@@ -64,7 +66,8 @@ export class Detail {
     const { quantity, unit } = this.project.criterion;
     const number = this.project.quantity(row);
     const said = number === null || row.state === "none" ? "" : unit ? `, ${measured(number, unit)}` : `, ${quantity} ${measured(number, unit)}`;
-    return `${stateLabel(row.state)}${row.who ? ` by ${row.who}` : ""}${said}`;
+    const graph = row.residual === null || row.state === "none" ? "" : `, ${off(row.residual, row.turn)} off the graph`;
+    return `${stateLabel(row.state)}${row.who ? ` by ${row.who}` : ""}${said}${graph}`;
   }
 
   #clearing(row) {

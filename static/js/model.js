@@ -9,8 +9,10 @@ const DECISION_PAUSE = 60;
 
 const VALUE = { parameter: "value_threshold", quantity: "value", unit: "m", maximum: null, step: 0.05 };
 
-/** Tells "info", "rows", "progress", "match", "map", "parameters" and "trouble" as events. */
+/** Tells "info", "rows", "progress", "match", "graph", "search", "searched", "map", "parameters" and "trouble" as events. */
 export class Project extends EventTarget {
+  #said = false;
+
   constructor(id) {
     super();
     this.id = id;
@@ -77,6 +79,21 @@ export class Project extends EventTarget {
     this.refreshInfo();
   }
 
+  preview(url, signal) {
+    return get(url, { signal });
+  }
+
+  /** Search for loop closures, or stop the search. */
+  async search(action) {
+    this.#said &&= action !== "start";
+    this.#searched(await post(`${this.url}/loops`, { action }));
+  }
+
+  /** Put pairs of scans into the queue. */
+  addPairs(integrations) {
+    return post(`${this.url}/pairs`, { integrations });
+  }
+
   /** Take in one event of the server. */
   hear(event) {
     if (event.type === "match") this.#matched(event);
@@ -84,6 +101,8 @@ export class Project extends EventTarget {
     else if (event.type === "parameters") this.refresh(), this.tell("parameters");
     else if (event.type === "decision") this.#decided(event);
     else if (event.type === "hello" || event.type === "log") this.refresh();
+    else if (event.type === "graph") this.refresh(), this.tell("graph");
+    else if (event.type === "search") this.#searched(event);
     else if (event.type === "map") this.refreshInfo(), this.tell("map");
     else if (event.type === "error") this.tell("trouble", new Error(event.message));
   }
@@ -103,9 +122,12 @@ export class Project extends EventTarget {
   }
 
   async #loadInfo() {
+    const before = this.info?.search.running;
     this.info = await get(this.url);
+    if (before) this.#searchEnded();
     this.tell("info");
     this.tell("progress");
+    this.tell("search");
     if (this.info.merging) this.refreshInfo(MERGING_PAUSE);
   }
 
@@ -135,6 +157,25 @@ export class Project extends EventTarget {
   /** Newer rows, each in the place it has. */
   #put(rows) {
     for (const row of rows) Object.assign(this.index.get(row.id) ?? {}, row);
+  }
+
+  /** How far the search is; its last word is told once. */
+  #searched(event) {
+    if (!this.info) return;
+    const { running } = this.info.search;
+    const { done, total, message } = event;
+    this.info.search = { running: event.running, done, total, message };
+    this.tell("search");
+    if (running) this.#searchEnded();
+  }
+
+  /** Events and answers may cross: the end of a search is told once. */
+  #searchEnded() {
+    const { running, message } = this.info.search;
+    if (running || this.#said) return;
+    this.#said = true;
+    this.tell("searched", message);
+    this.refresh();
   }
 
   #progressed(event) {

@@ -4,9 +4,11 @@ import { Candidates } from "./candidates.js";
 import { Detail, prepare } from "./detail.js";
 import { byId, h, text } from "./dom.js";
 import { exportMenu } from "./exports.js";
+import { GraphWords, graphPanel, integrationLinks } from "./graph.js";
 import { head } from "./head.js";
 import { Heuristics } from "./heuristics.js";
 import { listen, sheet } from "./keys.js";
+import { loops } from "./loops.js";
 import { Project } from "./model.js";
 import { announce, failed } from "./notices.js";
 import { ParameterDrawer } from "./parameters.js";
@@ -29,11 +31,12 @@ start().catch(unavailable);
 
 async function start() {
   prepare(byId("detail-state"));
-  new Detail(project, view, [candidates, new Heuristics(project)]);
+  new Detail(project, view, [candidates, new Heuristics(project), new GraphWords(project)]);
   new Threshold(project, queue);
   new ParameterDrawer(project);
-  for (const part of [head, summary, exportMenu]) part(project, view);
+  for (const part of [head, summary, exportMenu, loops, graphPanel]) part(project, view);
   project.addEventListener("trouble", ({ detail }) => failed(detail));
+  integrationLinks(byId("panel-map"), (id) => queue.select(id));
   keyboard();
   await project.load();
   byId("workbench").setAttribute("aria-busy", "false");

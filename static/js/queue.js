@@ -2,6 +2,7 @@
 
 import { byId, fill, h, icon, set, setIcon, text } from "./dom.js";
 import { count, measured, pair, whole } from "./format.js";
+import { off } from "./graph.js";
 import { VirtualList } from "./virtual.js";
 
 const HEIGHT = 34;
@@ -18,8 +19,17 @@ const FILTERS = [
   ["pending", "Open", (row) => row.state === "pending"],
   ["accepted", "Accepted", (row) => row.state === "accepted"],
   ["rejected", "Rejected", (row) => row.state === "rejected"],
+  ["loops", "Loops", (row) => row.kind !== "neighbour"],
+  ["silenced", "Silenced", (row) => row.silenced],
   ["none", "None", (row) => row.state === "none" || row.state === "failed"],
 ];
+
+const KINDS = { closure: "loop closure", imported: "imported", manual: "by hand", neighbour: "" };
+const ORDERS = {
+  doubt: null,
+  residual: (a, b) => (b.residual ?? -1) - (a.residual ?? -1),
+  scans: (a, b) => compare(scans(a), scans(b)),
+};
 
 export const stateLabel = (state) => STATES[state]?.label ?? state;
 export const stateIcon = (state) => STATES[state]?.icon ?? "none";
@@ -27,6 +37,7 @@ export const stateIcon = (state) => STATES[state]?.icon ?? "none";
 export class Queue {
   #filter = "all";
   #search = "";
+  #order = "doubt";
   #flips = { passes: new Set(), fails: new Set() };
   #shown = [];
   #scale = 1;
@@ -51,6 +62,7 @@ export class Queue {
   refresh() {
     const test = FILTERS.find(([name]) => name === this.#filter)[2];
     this.#shown = this.project.rows.filter((row) => test(row) && found(row, this.#search));
+    if (ORDERS[this.#order]) this.#shown.sort(ORDERS[this.#order]);
     this.#threshold = this.project.info?.threshold ?? 0;
     this.#scale = this.project.criterion.maximum ?? scale(this.project, this.#threshold);
     this.list.show(this.#shown, this.view.integration);
@@ -90,6 +102,7 @@ export class Queue {
 
   #controls() {
     byId("search").addEventListener("input", (event) => this.#find(event.target.value));
+    byId("order").addEventListener("change", (event) => ((this.#order = event.target.value), this.refresh()));
     this.box.addEventListener("keydown", (event) => this.#key(event));
     this.box.addEventListener("click", (event) => {
       const row = event.target.closest("[role=option]");
@@ -111,7 +124,9 @@ export class Queue {
     for (const chip of byId("filters").children) {
       const [name, , test] = FILTERS.find(([filter]) => filter === chip.dataset.filter);
       set(chip, "aria-pressed", String(name === this.#filter));
-      text(chip.lastElementChild, whole(this.project.rows.filter(test).length));
+      const number = this.project.rows.filter(test).length;
+      chip.hidden = number === 0 && RARE.has(name) && name !== this.#filter;
+      text(chip.lastElementChild, whole(number));
     }
   }
 
@@ -160,7 +175,8 @@ export class Queue {
 
   #draw(element, row) {
     const [state, id, bar, value, note] = element.children;
-    Object.assign(element.dataset, { id: row.id, state: row.state, verdict: row.verdict ?? "" });
+    Object.assign(element.dataset, { id: row.id, state: row.state, verdict: row.verdict ?? "", kind: row.kind });
+    element.title = [KINDS[row.kind], row.residual === null ? "" : `${off(row.residual, row.turn)} off the graph`].filter(Boolean).join(", ");
     element.id = `row-${row.id}`;
     setIcon(state.firstElementChild, stateIcon(row.state));
     text(state.lastElementChild, stateLabel(row.state));
@@ -174,11 +190,13 @@ export class Queue {
 
   #note(note, row) {
     const flip = this.#flips.passes.has(row.id) ? "would pass" : this.#flips.fails.has(row.id) ? "would fail" : "";
-    note.className = flip ? `note ${flip.replace(" ", "-")}` : "note";
-    text(note, flip || (row.state === "pending" ? PROPOSALS[row.verdict] : SHORT[row.state]) || row.heuristic);
+    const graph = row.silenced ? "silenced" : "";
+    note.className = flip ? `note ${flip.replace(" ", "-")}` : `note ${graph}`;
+    text(note, flip || graph || (row.state === "pending" ? PROPOSALS[row.verdict] : SHORT[row.state]) || row.heuristic);
   }
 }
 
+const RARE = new Set(["loops", "silenced"]);
 const PROPOSALS = { accepted: "→ accept", review: "→ look", rejected: "→ reject" };
 const SHORT = { none: "none found", failed: "failed", matching: "matching" };
 
@@ -202,7 +220,16 @@ function scale(project, threshold) {
 }
 
 function found(row, words) {
-  return !words || [row.id, pair(row.id), row.heuristic, row.who, row.reason, stateLabel(row.state)].some((part) => part?.toLowerCase().includes(words));
+  return !words || [row.id, pair(row.id), row.heuristic, row.who, row.reason, KINDS[row.kind], stateLabel(row.state)].some((part) => part?.toLowerCase().includes(words));
+}
+
+function scans(row) {
+  return row.id.split(/[.-]/).map(Number);
+}
+
+function compare(a, b) {
+  const at = a.findIndex((number, place) => number !== b[place]);
+  return at < 0 ? 0 : a[at] - b[at];
 }
 
 function nothing(info) {

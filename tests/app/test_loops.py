@@ -6,12 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app.claims import CLAIMED
 from app.errors import UnknownError
+from app.graph_layers import TIES
 from app.resources import samples_folder
 from app.session import Session
+from app.workbench import View
 from segmap.errors import ProjectError
 from segmap.events import Proposal
 from segmap.pose import Pose2
@@ -370,3 +373,43 @@ def test_the_search_over_http(client: Any, project: str) -> None:
     assert "found" in search["message"]
     assert client.post(f"{url}/loops", json={"action": "cancel"}).json() == search
     assert client.post(f"{url}/loops", json={"action": "dance"}).status_code == 422
+
+
+# --- the scene ------------------------------------------------------------------------------------
+
+
+def test_a_click_on_a_line_of_the_map_selects_its_integration(session: Session) -> None:
+    """Accepted ones are drawn by how far off they are, closures to be decided dashed; both can be clicked."""
+    accept_all(session)
+    session.propose(manual(FAR, FARTHER))
+    assert session.settle(PATIENCE)
+    session.decide([FAR], "accepted")
+    assert session.settle(PATIENCE)
+    view = View(session)
+    view.set_stage("map")
+    view.switch_layer("map", on=False)
+    drawn = {drawable.name: drawable for drawable in view.picture().drawables if drawable.source == TIES}
+    assert {"edges/0", "closures"} <= set(drawn)
+    places = view.content().places
+    for integration in (FARTHER, FAR):
+        first, second = (places[ScanId(0, int(name[2:]))] for name in integration.split("-"))
+        for share in np.linspace(0.1, 0.9, 33):  # where no other line is nearer
+            view.pick(first.x + share * (second.x - first.x), first.y + share * (second.y - first.y), 0.05)
+            if view.looks.integration == integration:
+                break
+        assert view.looks.integration == integration
+        assert view.looks.stage == "map"
+        assert any(d.name == "edges/selected" for d in view.picture().drawables)
+    view.close()
+
+
+def test_a_view_leaves_a_pair_that_is_taken_out_of_the_queue(session: Session) -> None:
+    """Another person's undo does not leave it looking at nothing."""
+    view = View(session)
+    session.propose(manual(FAR))
+    assert session.settle(PATIENCE)
+    view.select(FAR)
+    session.undo()
+    assert view.looks.integration in session.integrations
+    assert view.snapshot()["row"]["id"] == view.looks.integration
+    view.close()
