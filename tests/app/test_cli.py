@@ -112,7 +112,7 @@ def test_help_names_every_command_and_every_command_has_help(run: Run) -> None:
         (("integrate", HALL, "0", "1", "--set", "taus=1"), "There is no parameter 'taus'"),
         (("integrate", HALL, "0", "1", "--set", "max_range"), "write --set NAME=VALUE"),
         (("integrate", HALL, "0", "1", "--set", "max_range=-1"), "Parameter max_range cannot be '-1'"),
-        (("merge", HALL, "--method", "luck"), "There is no merging method 'luck'. Methods are: sequential, tree, pivot"),
+        (("merge", HALL, "--method", "luck"), "no merging method 'luck'. Methods are: sequential, tree, pivot"),
         (("merge", HALL, "--out", "map.pdf"), "map.pdf does not say its format"),
         (("merge", HALL, "--project", HALL), "is there already"),
         (("export", HALL, "--to", "svg", "--out", "map.svg"), "hall.log"),
