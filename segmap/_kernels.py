@@ -204,22 +204,56 @@ def _squared_distance(x, y, x1, y1, x2, y2):  # type: ignore[no-untyped-def]
     return dx * dx + dy * dy
 
 
+@_inlined
+def _squared_from_edge(segments, i, vertices, k):  # type: ignore[no-untyped-def]
+    """Squared distance of a segment from an edge of a polyline: the larger of those of its extremes."""
+    x1, y1, x2, y2 = vertices[k, 0], vertices[k, 1], vertices[k + 1, 0], vertices[k + 1, 1]
+    start = _squared_distance(segments[i, 0], segments[i, 1], x1, y1, x2, y2)
+    return max(start, _squared_distance(segments[i, 2], segments[i, 3], x1, y1, x2, y2))
+
+
+@_inlined
+def _closest_edge(segments, i, vertices):  # type: ignore[no-untyped-def]
+    """The edge of a polyline closest to a segment, the first of equals, and the squared distance."""
+    nearest = np.inf
+    edge = 0
+    for k in range(len(vertices) - 1):
+        squared = _squared_from_edge(segments, i, vertices, k)
+        if squared < nearest:
+            nearest = squared
+            edge = k
+    return edge, nearest
+
+
 @_compiled
 def closest_edges(segments: FloatArray, vertices: FloatArray) -> tuple[FloatArray, IntArray]:
-    """For each segment (n, 4), the distance to its closest edge of a polyline (k, 2), and that edge, (n,) each."""
-    distances = np.empty(len(segments))
+    """For each segment (n, 4), the squared distance to its closest edge of a polyline (k, 2), and that edge."""
+    squares = np.empty(len(segments))
     edges = np.empty(len(segments), np.int64)
     for i in range(len(segments)):
-        nearest = np.inf
-        for k in range(len(vertices) - 1):
-            x1, y1, x2, y2 = vertices[k, 0], vertices[k, 1], vertices[k + 1, 0], vertices[k + 1, 1]
-            start = _squared_distance(segments[i, 0], segments[i, 1], x1, y1, x2, y2)
-            end = _squared_distance(segments[i, 2], segments[i, 3], x1, y1, x2, y2)
-            if max(start, end) < nearest:
-                nearest = max(start, end)
+        edges[i], squares[i] = _closest_edge(segments, i, vertices)
+    return squares, edges
+
+
+@_compiled
+def closest_edges_again(
+    segments: FloatArray, vertices: FloatArray, squares: FloatArray, edges: IntArray, edge: int, added: int
+) -> None:
+    """Bring what :func:`closest_edges` gave up to date, after an edge was replaced by itself and some ``added`` ones.
+
+    Only the segments that edge was closest to are compared with all edges.
+    """
+    for i in range(len(segments)):
+        if edges[i] == edge:
+            edges[i], squares[i] = _closest_edge(segments, i, vertices)
+            continue
+        if edges[i] > edge:
+            edges[i] += added
+        for k in range(edge, edge + added + 1):
+            squared = _squared_from_edge(segments, i, vertices, k)
+            if squared < squares[i] or (squared == squares[i] and k < edges[i]):
+                squares[i] = squared
                 edges[i] = k
-        distances[i] = math.sqrt(nearest)
-    return distances, edges
 
 
 @_compiled

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from worlds import maps, poses, room
 
-from segmap._kernels import covers
+from segmap._kernels import closest_edges as closest_edges_kernel
+from segmap._kernels import closest_edges_again, covers
 from segmap.chains import MatchingChain, matching_chains
-from segmap.fusion import closest_edges, fuse, polyline
+from segmap.fusion import chains, closest_edges, fuse, polyline
 from segmap.parameters import Parameters, preset
 from segmap.pose import Pose2
 from segmap.segments import Order, SegmentMap, Source, extract
@@ -262,3 +263,24 @@ def test_integrated_pairs_hold_less_than_both_scans(benchmarks, datasets):
         after.append(result.lengths.sum())
     assert len(after) == 30
     assert sum(after) < 0.8 * sum(before)
+
+
+@given(maps(most=12), st.booleans())
+@loose
+def test_a_polyline_grown_step_by_step_is_that_of_the_algorithm(members, again):
+    """Bringing distances up to date after an insertion gives what computing all of them anew gives, to the last bit."""
+    if not len(members):
+        return
+    parameters = Parameters(fusion_variant="greedy", fusion_tolerance=0.05)
+    vertices = chains._first_edge(members)[0]
+    squares, edges = closest_edges_kernel(members.coordinates, vertices)
+    waiting = np.ones(len(members), bool)
+    for _ in range(2 * len(members)):
+        s = int(np.argmax(np.where(waiting, squares, -1.0)))
+        waiting[s] = again
+        edge, before = int(edges[s]), len(vertices)
+        vertices = chains._inserted(vertices, edge, members.coordinates[s], parameters.point_distance_tolerance)
+        closest_edges_again(members.coordinates, vertices, squares, edges, edge, len(vertices) - before)
+        fresh = closest_edges_kernel(members.coordinates, vertices)
+        assert np.array_equal(squares, fresh[0])
+        assert np.array_equal(edges, fresh[1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -114,14 +115,16 @@ def _grown(members: SegmentMap, parameters: Parameters, again: bool) -> Polyline
     segments = members.coordinates
     waiting = np.ones(len(segments), bool)
     bound = len(segments) * (parameters.fusion_bound if again else 1)
+    squares, edges = _kernels.closest_edges(segments, vertices)
     for insertions in range(bound + 1):
-        distances, edges = closest_edges(segments, vertices)
-        s = int(np.argmax(np.where(waiting, distances, -1.0)))
-        if not waiting[s] or distances[s] <= parameters.fusion_tolerance:
+        s = int(np.argmax(np.where(waiting, np.sqrt(squares), -1.0)))
+        if not waiting[s] or math.sqrt(squares[s]) <= parameters.fusion_tolerance:
             return Polyline(vertices, directed, insertions, finished=True)
         if insertions < bound:
             waiting[s] = again
-            vertices = _inserted(vertices, int(edges[s]), segments[s], parameters.point_distance_tolerance)
+            edge, before = int(edges[s]), len(vertices)
+            vertices = _inserted(vertices, edge, segments[s], parameters.point_distance_tolerance)
+            _kernels.closest_edges_again(segments, vertices, squares, edges, edge, len(vertices) - before)
     return Polyline(vertices, directed, bound, finished=False)
 
 
@@ -143,8 +146,8 @@ def closest_edges(segments: FloatArray, vertices: FloatArray) -> tuple[FloatArra
 
     The distance from an edge is the larger of the distances of the two extremes.
     """
-    distances, edges = _kernels.closest_edges(segments, vertices)
-    return distances, edges
+    squares, edges = _kernels.closest_edges(segments, vertices)
+    return np.sqrt(squares), edges
 
 
 def _inserted(vertices: FloatArray, edge: int, segment: FloatArray, tolerance: float) -> FloatArray:

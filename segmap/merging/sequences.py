@@ -92,8 +92,8 @@ def merge(
     the sequence to integrate in the end, as the last scan with the first, and so is each given pair that the sequence
     does not hold: they join components, or tell how well a loop closes. ``between`` are scans left out of the
     sequence: where a pair fails it is bridged through them, unless the parameter ``bridging`` is off.
-    ``map_heuristic`` is taken where a partial map takes part; by default the heuristic itself, or ``random`` where
-    that is ``all``, as the angles of a partial map are too many. ``progress`` is told how many of how many
+    ``map_heuristic`` is taken where a partial map takes part; by default the heuristic itself, or the paper's
+    ``consecutive`` where that is ``all``, as the angles of a partial map are too many. ``progress`` is told how many of how many
     planned calls are done; ``workers`` pairs of scans are matched at a time.
 
     Raises:
@@ -134,7 +134,7 @@ def how_to(parameters: Parameters | None, heuristic: str | None, mode: str, map_
         ParameterError: there is no such heuristic or mode.
     """
     chosen = chosen_heuristic(mode, heuristic)
-    for_maps = chosen_heuristic(mode, map_heuristic or ("random" if chosen == "all" else chosen))
+    for_maps = chosen_heuristic(mode, map_heuristic or ("consecutive" if chosen == "all" else chosen))
     return How(parameters or Parameters(), chosen, for_maps, mode)
 
 

@@ -1,0 +1,315 @@
+"""Merging on public logs, as Markdown: the paper's Section V-B, Table 4, Figs. 16 and 17, and clean maps of whole logs.
+
+    python benchmarks/merging.py [--tables methods online robots fusion] [--logs DIR] [--names intel aces ...]
+
+``methods``: sequential, tree and pivot on stretches of 29 scans, as many as the paper merged. ``online``: seconds for
+each new scan, by method. ``robots``: four local maps of ten scans, two shared with the next, all pairs integrated.
+``fusion``: doubles along walls before and after all scans of a log are fused at once, at the log's own poses.
+
+Merging gets ranges and nothing else; a neighbour is right within 0.25 m and 5 degrees of the log's own poses, which
+are good to about 0.1 m. Times are processor seconds of one thread, kernels compiled.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise
+from pathlib import Path
+from statistics import median
+
+from common import SHARED, markdown, provenance
+
+from segmap.benchmark import is_right
+from segmap.fusion import fuse_all, spurious_length
+from segmap.integration import match_maps
+from segmap.logs import read_log
+from segmap.merging import METHODS, Component, Merge, extend, merge
+from segmap.parameters import Parameters, preset
+from segmap.pose import Pose2
+from segmap.scans import LaserLog, ScanId
+from segmap.segments import SegmentMap, extract
+
+LOGS = {
+    "intel": ("intel/intel-corrected.log.gz", 3),
+    "aces": ("aces/aces-corrected.log.gz", 2),
+    "csail": ("csail/csail-corrected.log.gz", 2),
+    "fr101": ("fr101/freiburg-101-corrected.log.gz", 2),
+    "fr079": ("fr079/fr079-graph.log.gz", 4),
+}
+"""file, and every which scan is taken: about a metre apart"""
+SCANS = 29
+"""in a stretch, as in the paper's Section V-B"""
+NEW = 9
+"""scans added one by one"""
+LOCAL, SHARED_SCANS, ROBOTS = 10, 2, 4
+PLACED = 0.5, math.radians(5.0)
+"""metres and radians; two local maps nearer than this to the log's poses are placed right: each has drifted a little"""
+MODES: tuple[tuple[str, str | None], ...] = (("verified", None), ("paper", None))
+PAPER_HEURISTICS = ("consecutive", "random")
+"""for partial maps in paper mode: what the paper used, and what finds most"""
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Some scans of a log."""
+
+    name: str
+    log: LaserLog
+    start: int
+    stride: int
+    count: int
+
+    @property
+    def ids(self) -> list[ScanId]:
+        """The scans."""
+        last = min(len(self.log), self.start + self.stride * self.count)
+        return [ScanId(0, index) for index in range(self.start, last, self.stride)]
+
+    def maps(self, parameters: Parameters) -> dict[ScanId, SegmentMap]:
+        """The segments of its scans."""
+        return {scan: extract(self.log[scan.scan], parameters, 0, scan.scan) for scan in self.ids}
+
+    def between(self, parameters: Parameters) -> dict[ScanId, SegmentMap]:
+        """The segments of all scans from its first to its last."""
+        return replace(self, stride=1, count=(len(self.ids) - 1) * self.stride + 1).maps(parameters)
+
+    def truth(self, a: ScanId, b: ScanId) -> Pose2:
+        """``T_a_b`` by the log's own poses."""
+        T_w_a, T_w_b = (self.log[scan.scan].logged_pose for scan in (a, b))
+        assert T_w_a is not None
+        assert T_w_b is not None
+        return T_w_a.inverse() @ T_w_b
+
+
+def timed(work: Callable[[], Merge]) -> tuple[Merge, float]:
+    """What some work gives, and the processor seconds it takes."""
+    started = time.process_time()
+    result = work()
+    return result, time.process_time() - started
+
+
+# --- the three methods (Section V-B) --------------------------------------------------------------
+
+
+def methods(stretches: Iterable[Stretch]) -> Iterator[str]:
+    """A table for each mode: calls, seconds, segments, doubles, components, and neighbours placed wrong."""
+    header = [
+        "Scans",
+        "Method",
+        *("calls", "s", "slowest call, s", "components", "largest", "wrong neighbours", "for review"),
+        *("segments", "length, m", "spurious, m", "fused at once: segments", "spurious, m"),
+    ]
+    stretches = list(stretches)
+    for mode, heuristic in MODES:
+        rows = [row for stretch in stretches for row in _rows(stretch, mode, heuristic)]
+        yield f"**{mode} mode**\n\n{markdown(header, rows)}"
+
+
+def _rows(stretch: Stretch, mode: str, heuristic: str | None) -> Iterator[list[object]]:
+    parameters = preset("verified" if mode == "verified" else "default")
+    maps, between = stretch.maps(parameters), stretch.between(parameters)
+    for method in METHODS:
+        made, seconds = timed(lambda method=method: merge(maps, parameters, heuristic, mode, method, between=between))
+        yield [_about(stretch), method, *_cost(made, seconds), *_result(made, stretch, between, parameters)]
+
+
+def _about(stretch: Stretch) -> str:
+    ids = stretch.ids
+    return f"{stretch.name} {ids[0].scan} to {ids[-1].scan}, every {stretch.stride}."
+
+
+def _cost(made: Merge, seconds: float) -> list[str]:
+    slowest = max((call.match.milliseconds for call in made.calls), default=0.0) / 1000.0
+    return [str(len(made.calls)), f"{seconds:.1f}", f"{slowest:.2f}"]
+
+
+def _result(made: Merge, stretch: Stretch, maps: Mapping[ScanId, SegmentMap], parameters: Parameters) -> list[str]:
+    held = [component for component in made.components if len(component.scans) > 1]
+    clean = [fuse_all(maps, component.poses, parameters) for component in held]
+    steps = [node.step for part in made.components if part.tree for node in part.tree.nodes() if node.step]
+    return [
+        str(len(made.components)),
+        str(max(len(component.scans) for component in made.components)),
+        str(sum(_wrong(component, stretch) for component in held)),
+        str(sum(step.review for step in steps)),
+        str(sum(len(component.map) for component in held)),
+        f"{sum(component.map.lengths.sum() for component in held):.0f}",
+        f"{sum(spurious_length(component.map) for component in held):.1f}",
+        str(sum(map(len, clean))),
+        f"{sum(map(spurious_length, clean)):.1f}",
+    ]
+
+
+def _wrong(component: Component, stretch: Stretch) -> int:
+    """How many scans are placed wrong beside the one before."""
+    order, poses = sorted(component.scans), component.poses
+    return sum(not is_right(poses[a].inverse() @ poses[b], stretch.truth(a, b)) for a, b in pairwise(order))
+
+
+# --- one scan more (Table 4) ----------------------------------------------------------------------
+
+
+def online(stretches: Iterable[Stretch], repeats: int = 3) -> Iterator[str]:
+    """Seconds for each new scan, the median of some runs."""
+    for stretch in stretches:
+        first, *new = stretch.ids
+        for mode, heuristic in (("paper", "consecutive"), ("verified", None)):
+            columns = [_added(stretch, first, new, method, mode, heuristic, repeats) for method in METHODS]
+            rows = [
+                [f"scan {scan.scan}", *(f"{seconds:.3f}" for seconds in row)]
+                for scan, row in zip(new, zip(*columns, strict=True), strict=True)
+            ]
+            how = f"{_about(stretch)} {mode} mode, {heuristic or 'automatic'}"
+            yield f"**{how}**\n\n{markdown(['New scan', *METHODS], rows)}"
+
+
+def _added(
+    stretch: Stretch,
+    first: ScanId,
+    new: Sequence[ScanId],
+    method: str,
+    mode: str,
+    heuristic: str | None,
+    repeats: int,
+) -> list[float]:
+    parameters = preset("verified" if mode == "verified" else "default")
+    maps = stretch.maps(parameters)
+    given = {(a, b): stretch.truth(a, b) for a, b in pairwise(stretch.ids)} if mode == "paper" else {}
+    runs = []
+    for _ in range(repeats + 1):  # the first one warms up
+        made = merge({first: maps[first]}, parameters, heuristic, mode, method)
+        runs.append([])
+        for scan in new:
+            started = time.process_time()
+            grown = extend(made, scan, maps[scan], parameters, heuristic, mode)
+            runs[-1].append(time.process_time() - started)
+            if len(grown.components) > 1:  # not integrated: a person places it, and the next one is timed on the whole
+                grown = extend(made, scan, maps[scan], parameters, heuristic, mode, given=given or _by_truth(stretch))
+            made = grown
+    return [median(times) for times in zip(*runs[1:], strict=True)]
+
+
+def _by_truth(stretch: Stretch) -> dict[tuple[ScanId, ScanId], Pose2]:
+    return {(a, b): stretch.truth(a, b) for a, b in pairwise(stretch.ids)}
+
+
+# --- many robots (Figs. 16 and 17) ----------------------------------------------------------------
+
+
+def robots(logs: Mapping[str, LaserLog]) -> Iterator[str]:
+    """All pairs of four local maps: values of right and wrong integrations."""
+    header = ["Pair", "scans shared", "segments", *PAPER_HEURISTICS, "verified: confidence", "value", "s"]
+    for name, log in logs.items():
+        found = _local_maps(name, log)
+        if found is None:
+            yield f"**{name}**: no {ROBOTS} local maps of {LOCAL} scans each hold together."
+            continue
+        stretch, parts = found
+        lengths = ", ".join(f"{part.map.lengths.sum():.0f} m" for part in parts)
+        rows = [_pair(stretch, parts, i, j) for i, j in combinations(range(ROBOTS), 2)]
+        yield f"**{_about(stretch)}** Length of the local maps: {lengths}.\n\n{markdown(header, rows)}"
+
+
+def _local_maps(name: str, log: LaserLog) -> tuple[Stretch, list[Component]] | None:
+    """The first stretch of a log whose four local maps each hold together, and those maps."""
+    parameters = preset("verified")
+    step = LOCAL - SHARED_SCANS
+    count = ROBOTS * step + SHARED_SCANS
+    for start in range(0, len(log), step):
+        stretch = Stretch(name, log, start, LOGS[name][1], count)
+        ids = stretch.ids
+        if len(ids) < count:
+            return None
+        maps = stretch.maps(parameters)
+        parts = []
+        for robot in range(ROBOTS):
+            own = {scan: maps[scan] for scan in ids[robot * step : robot * step + LOCAL]}
+            components = merge(own, parameters, None, "verified").components
+            if len(components) > 1 or _wrong(components[0], stretch):
+                break
+            parts += components
+        if len(parts) == ROBOTS:
+            return stretch, parts
+    return None
+
+
+def _pair(stretch: Stretch, parts: Sequence[Component], i: int, j: int) -> list[object]:
+    """Value of the best transformation by heuristic, and what verified mode says; wrong ones in brackets."""
+    first, second = parts[i], parts[j]
+    truth = stretch.truth(first.scans[0], second.scans[0])
+    overlap = set(first.scans) & set(second.scans)
+    cells: list[object] = [f"L{i + 1}, L{j + 1}", len(overlap), f"{len(first.map)}, {len(second.map)}"]
+    for heuristic in PAPER_HEURISTICS:
+        match = match_maps(first.map, second.map, Parameters(), heuristic)
+        cells.append(_told(f"{match.value:.1f} m", match.T_1_2, truth))
+    started = time.process_time()
+    match = match_maps(first.map, second.map, preset("verified"), None, "verified")
+    seconds = time.process_time() - started
+    sure = f"{match.confidence or 0.0:.3f} {match.verdict}"
+    return [*cells, _told(sure, match.T_1_2, truth), f"{match.value:.1f} m", f"{seconds:.2f}"]
+
+
+def _told(text: str, T_1_2: Pose2 | None, truth: Pose2) -> str:
+    metres, radians = T_1_2.distance(truth) if T_1_2 else (math.inf, math.inf)
+    return text if metres <= PLACED[0] and radians <= PLACED[1] else f"({text})"
+
+
+# --- whole logs -----------------------------------------------------------------------------------
+
+
+def fusion(logs: Mapping[str, LaserLog]) -> str:
+    """Doubles along walls before and after."""
+    header = ["Log", "scans", "segments", "length, m", "spurious, m", "segments", "length, m", "spurious, m", "s"]
+    whole = [(name, log, len(log)) for name, log in logs.items()]
+    rows = [_fused(*row) for row in ([("intel", logs["intel"], 60)] if "intel" in logs else []) + whole]
+    return markdown(header, rows)
+
+
+def _fused(name: str, log: LaserLog, count: int) -> list[object]:
+    parameters = preset("verified")
+    stretch = Stretch(name, log, 0, 1, count)
+    maps = stretch.maps(parameters)
+    poses = {scan: stretch.truth(ScanId(0, 0), scan) for scan in maps}
+    before = SegmentMap.joined(maps[scan].moved(poses[scan]) for scan in maps)
+    started = time.process_time()
+    after = fuse_all(maps, poses, parameters)
+    seconds = time.process_time() - started
+    return [name, len(maps), *_clean(before), *_clean(after), f"{seconds:.1f}"]
+
+
+def _clean(segment_map: SegmentMap) -> list[str]:
+    return [str(len(segment_map)), f"{segment_map.lengths.sum():.0f}", f"{spurious_length(segment_map):.1f}"]
+
+
+# --- all of it ------------------------------------------------------------------------------------
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--logs", type=Path, default=SHARED / "datasets", help="folder of the logs")
+    parser.add_argument("--names", nargs="+", choices=LOGS, default=list(LOGS))
+    parser.add_argument("--tables", nargs="+", default=("methods", "online", "robots", "fusion"))
+    options = parser.parse_args()
+    print(provenance(), end="\n\n", flush=True)
+    logs = {name: read_log(options.logs / LOGS[name][0]) for name in options.names}
+    stretches = [Stretch(name, log, 0, LOGS[name][1], SCANS) for name, log in logs.items()]
+    tables: dict[str, tuple[str, Callable[[], Iterable[str]]]] = {
+        "methods": ("The three methods side by side", lambda: methods(stretches)),
+        "online": ("Table 4: seconds for each new scan", lambda: online([replace(s, count=NEW) for s in stretches])),
+        "robots": ("Figs. 16 and 17: four local maps", lambda: robots(logs)),
+        "fusion": ("All scans at once", lambda: [fusion(logs)]),
+    }
+    for name in options.tables:
+        title, made = tables[name]
+        print(f"### {title}", end="\n\n")
+        for table in made():
+            print(table, end="\n\n", flush=True)
+
+
+if __name__ == "__main__":
+    main()
