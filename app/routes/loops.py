@@ -58,8 +58,8 @@ def import_graph(session: Opened, file: Annotated[UploadFile, File()]) -> Import
         pairs=count,
         new=new,
         problems=list(found.problems),
-        message=f"{found.edges} edges were read, {found.loops} of them loop closures: {count} pairs of this project,"
-        f" {new} of them new in the queue.",
+        message=f"Of {found.edges} edges in {source.name}, {found.loops} close loops; {count} of these join scans of"
+        f" this project, {new} new in the queue.",
     )
 
 

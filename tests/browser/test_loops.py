@@ -106,7 +106,7 @@ def test_pairs_by_hand_and_from_a_file(desk: Any, server: Any, tmp_path: Path) -
     vertices = [f"VERTEX_SE2 {i} {i} 0 0\n" for i in range(scans)]
     graph.write_text("".join(vertices) + "EDGE_SE2 2 8 1.5 0.25 0.1 400 0 0 400 0 1000\n")
     desk.page.locator("#graph-file").set_input_files(graph)
-    desk.page.get_by_text("1 pairs of this project, 1 of them new").wait_for()
+    desk.page.get_by_text("Of 1 edges in other.g2o, 1 close loops").wait_for()
     desk.page.locator("#search").fill("imported")
     desk.row("0.2-0.8").click()
     desk.page.get_by_text("Imported from other.g2o").wait_for()
