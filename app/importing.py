@@ -9,6 +9,7 @@ import numpy as np
 
 from app.creation import Source
 from app.errors import RequestError
+from app.pairs import are_neighbours
 from segmap.errors import LogError
 from segmap.events import Covariance, IntegrationId, Proposal
 from segmap.graph import Edge
@@ -79,7 +80,7 @@ def _between(edge: GraphEdge, scans: Mapping[int, ScanId]) -> Edge | None:
     first, second = scans.get(edge.first), scans.get(edge.second)
     if first is None or second is None or first == second:
         return None
-    if first.log == second.log and abs(first.scan - second.scan) == 1:
+    if are_neighbours(min(first, second), max(first, second)):
         return None
     made = Edge(first, second, edge.T_1_2, edge.covariance, source="imported")
     return made if first < second else made.reversed()

@@ -9,7 +9,7 @@ from segmap.events import IntegrationId
 from segmap.project import ProjectState
 from segmap.scans import ScanId
 
-__all__ = ["KINDS", "integrations_of", "kind_of", "pairs_in"]
+__all__ = ["KINDS", "are_neighbours", "integrations_of", "kind_of", "pairs_in"]
 
 KINDS = ("neighbour", "closure", "imported", "manual")
 """Why a pair is in the queue: its scans follow each other, our search found it, another program's pose graph holds
@@ -26,10 +26,15 @@ def _consecutive(scan_ids: Sequence[ScanId]) -> Iterator[IntegrationId]:
     return (IntegrationId(a, b) for a, b in pairwise(scan_ids) if a.log == b.log)
 
 
+def are_neighbours(first: ScanId, second: ScanId) -> bool:
+    """Whether a scan follows the other in its log."""
+    return first.log == second.log and second.scan == first.scan + 1
+
+
 def kind_of(integration: IntegrationId, state: ProjectState) -> str:
     """Why a pair is asked about, one of ``KINDS``."""
     first, second = integration
-    if first.log == second.log and second.scan == first.scan + 1:
+    if are_neighbours(first, second):
         return "neighbour"
     proposal = state.proposals.get(str(integration))
     return "manual" if proposal is None else proposal.kind

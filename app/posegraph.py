@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any
 
 from app.jobs import Check, Latest
+from app.pairs import are_neighbours
 from app.review import Fate
 from segmap.events import Covariance, Decision, IntegrationId
 from segmap.graph import Edge, Optimised, Preview, Residual, Strength, Ways, explain, optimise, preview, strength
@@ -85,14 +86,10 @@ def _best(edges: tuple[Edge, ...], check: Check | None) -> Optimised:
     found = optimise(edges, check=check)
     if not found.silenced:
         return found
-    chains = optimise([one for one in edges if _neighbours(one)], check=check)
+    chains = optimise([one for one in edges if are_neighbours(one.first, one.second)], check=check)
     longest = max(chains.components, key=len, default=())
     other = optimise(edges, {scan: chains.poses[scan] for scan in longest}, check=check)
     return min(found, other, key=_loss)
-
-
-def _neighbours(one: Edge) -> bool:
-    return one.first.log == one.second.log and one.second.scan == one.first.scan + 1
 
 
 def _loss(found: Optimised) -> float:

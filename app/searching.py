@@ -12,6 +12,7 @@ from typing import Any
 from app.jobs import Check, checker
 from app.matching import Settings
 from app.modes import parameters_in
+from app.pairs import are_neighbours
 from segmap.errors import CancelledError, SegmapError
 from segmap.events import IntegrationId, Proposal
 from segmap.graph import Residual
@@ -122,13 +123,8 @@ def find_closures(
 
 def _closures(whole: WholeMap) -> Iterator[Closure]:
     for link, residual in zip(whole.links, whole.optimised.residuals, strict=True):
-        if link.why in CLOSING and link.pair in whole.matches and not _neighbours(link.pair):
+        if link.why in CLOSING and link.pair in whole.matches and not are_neighbours(*link.pair):
             yield Closure(link, whole.matches[link.pair], residual)
-
-
-def _neighbours(pair: Pair) -> bool:
-    first, second = pair
-    return first.log == second.log and second.scan == first.scan + 1
 
 
 def _name(pair: Pair) -> str:
