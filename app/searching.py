@@ -6,6 +6,7 @@ import logging
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -201,6 +202,9 @@ class LoopSearch:
             message = "The search for loop closures was stopped; nothing was proposed."
         except SegmapError as error:
             message = f"The search for loop closures failed: {error}"
+        except BrokenProcessPool:
+            message = "The search for loop closures failed: a process of it was ended from outside, as when memory runs"
+            message += " out. Close other programs and search again."
         except Exception as error:
             log.exception("The search for loop closures failed.")
             message = f"The search for loop closures failed: {type(error).__name__}. The server's output says where."

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from app.claims import CLAIMED
 from app.errors import UnknownError
@@ -284,13 +286,15 @@ def test_a_search_that_fails_says_why(open_session: Open, monkeypatch: pytest.Mo
     """In a sentence; the session goes on."""
     session = open_session()
 
-    def fail(*_: Any, **__: Any) -> Any:
-        raise ProjectError("there is no moon tonight.")
-
-    monkeypatch.setattr("app.searching.map_scans", fail)
-    session.loops.start()
-    assert session.loops.settle(PATIENCE)
-    assert session.loops.progress.message == "The search for loop closures failed: there is no moon tonight."
+    for error, words in (
+        (ProjectError("there is no moon tonight."), "failed: there is no moon tonight."),
+        (TerminatedWorkerError("killed"), "ended from outside"),
+        (ValueError("a bug"), "ValueError"),
+    ):
+        monkeypatch.setattr("app.searching.map_scans", Mock(side_effect=error))
+        session.loops.start()
+        assert session.loops.settle(PATIENCE)
+        assert words in session.loops.progress.message
     assert session.settle(PATIENCE)
 
 
