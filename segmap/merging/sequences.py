@@ -93,8 +93,8 @@ def merge(
     does not hold: they join components, or tell how well a loop closes. ``between`` are scans left out of the
     sequence: where a pair fails it is bridged through them, unless the parameter ``bridging`` is off.
     ``map_heuristic`` is taken where a partial map takes part; by default the heuristic itself, or the paper's
-    ``consecutive`` where that is ``all``, as the angles of a partial map are too many. ``progress`` is told how many of how many
-    planned calls are done; ``workers`` pairs of scans are matched at a time.
+    ``consecutive`` where that is ``all``, as the angles of a partial map are too many. ``progress`` is told how
+    many of how many planned calls are done; ``workers`` pairs of scans are matched at a time.
 
     Raises:
         ParameterError: there is no such method, heuristic or mode.

@@ -220,7 +220,8 @@ function scale(project, threshold) {
 }
 
 function found(row, words) {
-  return !words || [row.id, pair(row.id), row.heuristic, row.who, row.reason, KINDS[row.kind], stateLabel(row.state)].some((part) => part?.toLowerCase().includes(words));
+  const told = [row.id, pair(row.id), row.heuristic, row.who, row.reason, KINDS[row.kind], stateLabel(row.state)];
+  return !words || told.some((part) => part?.toLowerCase().includes(words));
 }
 
 function scans(row) {
