@@ -14,15 +14,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from segmap._sight_kernels import CLASSES, CONTRADICTED, SHADOWED, SUPPORTED, UNSEEN, Sighting
+from segmap._stepping import step_down
 from segmap.pose import FloatArray
 
 __all__ = ["Field", "draw", "look", "normal_equations", "refine"]
 
 NONE = -1
-MOVE_STEP = 0.3
-"""metres; refinement moves no farther in one step"""
-TURN_STEP = 0.1
-"""radians; nor turns farther"""
 
 _compiled = njit(cache=True, nogil=True, error_model="numpy")
 _inlined = njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -350,20 +347,5 @@ def refine(
             total = normal_equations(field_1, field_2, points_1, points_2, refined[k], gate, normal, rhs)
             if total < 3.0:
                 break
-            _step(normal, rhs, refined[k])
+            step_down(normal, rhs, refined[k])
     return refined
-
-
-@_compiled
-def _step(normal, rhs, pose):  # type: ignore[no-untyped-def]
-    """One damped, bounded Gauss-Newton step."""
-    damped = normal.copy()
-    damping = 1e-5 * (normal[0, 0] + normal[1, 1]) + 1e-9
-    for i in range(3):
-        damped[i, i] += damping
-    delta = np.linalg.solve(damped, rhs)
-    length = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1])
-    shrink = min(1.0, MOVE_STEP / max(length, 1e-12))
-    pose[0] += shrink * delta[0]
-    pose[1] += shrink * delta[1]
-    pose[2] += min(TURN_STEP, max(-TURN_STEP, delta[2]))

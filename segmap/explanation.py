@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydantic import TypeAdapter
 
-from segmap._kernels import TOUCH
-from segmap._sight_kernels import UNSEEN, nearest_segments
+from segmap._kernels import TOUCH, nearest_segments
+from segmap._sight_kernels import UNSEEN
 from segmap.chains import components
 from segmap.evaluation import LEAST_MATCH, evaluate, matching_values
 from segmap.parameters import Parameters

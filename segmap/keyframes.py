@@ -12,10 +12,10 @@ from itertools import pairwise
 
 from joblib import Parallel, delayed
 
+from segmap.consensus import Consensus, voted
 from segmap.integration import Match, Verdict, match_maps
 from segmap.links import (
     SIDE,
-    Consensus,
     Link,
     Pace,
     agreed,
@@ -23,7 +23,6 @@ from segmap.links import (
     pace_of,
     placed_from,
     steps_between,
-    voted,
 )
 from segmap.parameters import Parameters
 from segmap.pose import Pose2

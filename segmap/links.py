@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,25 +17,22 @@ import numpy as np
 
 from segmap.graph import Covariance, Edge
 from segmap.integration import Candidate, Match, Verdict
-from segmap.parameters import Parameters
 from segmap.pose import Pose2
-from segmap.refinement import refined
 from segmap.scans import ScanId
 from segmap.spreading import Pair
 from segmap.verdict import confidence, findings
-from segmap.visibility import Sighting, look
 
 __all__ = [
-    "Consensus",
     "Link",
+    "Near",
     "Pace",
     "agreed",
+    "alike",
     "confidence_among",
     "links_by_scan",
     "pace_of",
     "placed_from",
     "steps_between",
-    "voted",
 ]
 
 FLOOR = 0.02, math.radians(0.4)
@@ -54,16 +51,6 @@ PACED_CONFIDENCE = 0.9
 """a candidate that is the only one in pace needs this much"""
 PACED_LEAD = 0.2
 """and this share of its score as its lead over the next one in pace"""
-LEAST_VOTES, LEAST_SCORE, LEAST_LEAD = 2, 6.0, 0.1
-"""pairs that must agree, the metres all must score together, and the share of it they must be ahead of any rival"""
-MOST_CENTRES = 60
-"""votes that are tried as the middle of a cluster"""
-MOST_JUDGED = 10
-"""clusters that are judged by lines of sight"""
-SEVERITIES = np.array([2.0, 4.0])
-"""what a metre against takes from the metres supported: mildly and severely judged, the best must be the best"""
-JOINT_STEPS, JOINT_GATES = 4, (0.3, 0.1)
-"""steps of refinement of each pair, and the gates in metres it begins and ends with"""
 PACE_PERCENTILE, PACE_FACTOR, PACE_SLACK = 98.0, 1.5, (0.2, math.radians(5.0))
 
 
@@ -77,8 +64,8 @@ class Link:
     covariance: Covariance
     """of x, y (metres) and theta (radians), as the pose graph takes it"""
     why: str
-    """``accepted`` by its verdict; ``paced``, ``agreed``, ``voted``: see above; ``closed``, ``joined``: a loop;
-    ``tracked``: a scan between keyframes"""
+    """``accepted`` by its verdict; ``paced``, ``agreed``: see above; ``voted``: a consensus; ``closed``, ``joined``:
+    a loop; ``tracked``: a scan between keyframes"""
     confidence: float
     rank: int = 0
     """of the candidate among those of its match"""
@@ -226,27 +213,18 @@ def _closing(pair: Pair, match: Match, near: Near) -> Link | None:
     if not ways:
         return None
     for rank, candidate in enumerate(match.ranked[:CANDIDATES]):
-        if any(_same(candidate.T_1_2, way) for way in ways) and confidence_among([candidate]) >= LEAST_CONFIDENCE:
+        if any(alike(candidate.T_1_2, way) for way in ways) and confidence_among([candidate]) >= LEAST_CONFIDENCE:
             return Link.of(pair, match, rank, "agreed")
     return None
 
 
-def _same(T: Pose2, other: Pose2) -> bool:
+def alike(T: Pose2, other: Pose2, times: float = 1.0) -> bool:
+    """Whether two transformations say the same; with ``times``, so many times as far apart."""
     distance, turn = T.distance(other)
-    return distance <= CLOSE[0] and turn <= CLOSE[1]
+    return distance <= times * CLOSE[0] and turn <= times * CLOSE[1]
 
 
-# --- votes ----------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Vote:
-    """What one candidate says of the transformation between two groups of scans."""
-
-    weight: float
-    T_1_2: Pose2
-    pair: Pair
-    rank: int
+# --- what most links across a step say ------------------------------------------------------------
 
 
 def placed_from(start: ScanId, near: Near, among: Iterable[ScanId]) -> dict[ScanId, Pose2]:
@@ -260,105 +238,6 @@ def placed_from(start: ScanId, near: Near, among: Iterable[ScanId]) -> dict[Scan
                 poses[other] = poses[scan] @ T
                 waiting.append(other)
     return poses
-
-
-@dataclass(frozen=True)
-class Consensus:
-    """The transformation between two groups of scans that their pairs agree on best."""
-
-    T_1_2: Pose2
-    votes: tuple[Vote, ...]
-    """one of each pair that agrees"""
-    needed: int
-    """pairs that must agree: fewer where a group is a single scan"""
-    score: float
-    """metres: what the lines of sight of all pairs say of it, support less conflict"""
-    lead: float
-    """share of the score by which it is ahead of every distinct other, however severely conflict is judged"""
-
-    @property
-    def clear(self) -> bool:
-        """Whether enough speaks for it, and for nothing else."""
-        return len(self.votes) >= self.needed and self.score >= LEAST_SCORE and self.lead >= LEAST_LEAD
-
-
-def voted(
-    group_1: Mapping[ScanId, Pose2],
-    group_2: Mapping[ScanId, Pose2],
-    matches: Mapping[Pair, Match],
-    seen: Mapping[ScanId, Sighting],
-    parameters: Parameters,
-    allowed: Callable[[Pose2], bool] = lambda _: True,
-) -> Consensus | None:
-    """The transformation between two groups of scans that most of their pairs agree on; None where there is none.
-
-    Groups are given by the poses of their scans in a frame of each. Each pair votes for what each of its
-    candidates implies, where that is ``allowed``; what has most votes is judged by the lines of sight of all
-    pairs, also those that voted for something else.
-    """
-    votes = sorted(_votes(group_1, group_2, matches, allowed), key=lambda vote: -vote.weight)
-    clusters: list[tuple[float, Pose2, tuple[Vote, ...]]] = []
-    for vote in votes[:MOST_CENTRES]:
-        if not any(_same(vote.T_1_2, centre) for _, centre, _ in clusters):
-            agreeing = _one_each(other for other in votes if _same(other.T_1_2, vote.T_1_2))
-            clusters.append((sum(other.weight for other in agreeing), vote.T_1_2, agreeing))
-    clusters.sort(key=lambda cluster: -cluster[0])
-    judged = clusters[:MOST_JUDGED]
-    if not judged:
-        return None
-    totals = np.array([_joint(group_1, group_2, T_1_2, seen, parameters) for _, T_1_2, _ in judged])
-    scores = totals[:, :1] - totals[:, 1:] * SEVERITIES
-    best = int(np.argmax(scores.mean(axis=1)))
-    apart = [k for k, (_, T_1_2, _) in enumerate(judged) if not _nearly(T_1_2, judged[best][1])]
-    rivals = scores[apart].max(axis=0, initial=0.0)
-    leads = np.where(scores[best] > 0.0, 1.0 - rivals / np.maximum(scores[best], LEAST_SCORE), 0.0)
-    needed = min(LEAST_VOTES, len(group_1), len(group_2))
-    return Consensus(judged[best][1], judged[best][2], needed, float(scores[best].mean()), float(leads.min()))
-
-
-def _joint(
-    group_1: Mapping[ScanId, Pose2],
-    group_2: Mapping[ScanId, Pose2],
-    T_1_2: Pose2,
-    seen: Mapping[ScanId, Sighting],
-    parameters: Parameters,
-) -> tuple[float, float]:
-    """How many metres all pairs together support of a transformation between their groups, and speak against."""
-    totals = np.zeros(4)
-    for a, T_1_a in group_1.items():
-        for b, T_2_b in group_2.items():
-            pose = np.array([tuple(T_1_a.inverse() @ T_1_2 @ T_2_b)])
-            pose = refined(seen[a], seen[b], pose, JOINT_STEPS, *JOINT_GATES)
-            totals += look(seen[a], seen[b], pose, parameters)[0]
-    return float(totals[0]), float(totals[1] + totals[2])
-
-
-def _nearly(T: Pose2, other: Pose2) -> bool:
-    distance, turn = T.distance(other)
-    return distance <= 2.0 * CLOSE[0] and turn <= 2.0 * CLOSE[1]
-
-
-def _votes(
-    group_1: Mapping[ScanId, Pose2],
-    group_2: Mapping[ScanId, Pose2],
-    matches: Mapping[Pair, Match],
-    allowed: Callable[[Pose2], bool],
-) -> Iterator[Vote]:
-    for a, T_1_a in group_1.items():
-        for b, T_2_b in group_2.items():
-            match = matches.get((a, b))
-            for rank, candidate in enumerate(match.ranked[:CANDIDATES] if match else ()):
-                T_1_2 = T_1_a @ candidate.T_1_2 @ T_2_b.inverse()
-                if allowed(T_1_2):
-                    yield Vote(max(0.0, candidate.score or 0.0), T_1_2, (a, b), rank)
-
-
-def _one_each(votes: Iterable[Vote]) -> tuple[Vote, ...]:
-    """The strongest vote of each pair."""
-    kept: dict[Pair, Vote] = {}
-    for vote in votes:
-        kept.setdefault(vote.pair, vote)
-    return tuple(kept.values())
 
 
 def _outvoted(sequence: Sequence[ScanId], links: dict[Pair, Link]) -> dict[Pair, Link]:
@@ -404,10 +283,10 @@ def _minority(
         for link in those
         if link.first in before and link.second in after
     ]
-    support = [sum(w for _, other, w in said if _nearly(T, other)) for _, T, _ in said]
+    support = [sum(w for _, other, w in said if alike(T, other, 2.0)) for _, T, _ in said]
     winner = max(range(len(said)), key=lambda k: support[k], default=0)
     for k, (link, T, _) in enumerate(said):
-        if not _nearly(T, said[winner][1]) and support[k] < support[winner]:
+        if not alike(T, said[winner][1], 2.0) and support[k] < support[winner]:
             yield link, support[winner] - support[k]
 
 

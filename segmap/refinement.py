@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from segmap import _sight_kernels as kernels
+from segmap._hold_kernels import hold
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
 from segmap.segments import SegmentMap
@@ -101,6 +102,6 @@ def information(
     """
     points_1, points_2 = (thinned(seen, WITNESSES).points for seen in (seen_1, seen_2))
     walls = map_1.coordinates, map_2.coordinates
-    held = kernels.hold(points_1, points_2, *walls, poses, WALL_GATE, parameters.split_tolerance).sum(axis=1)
+    held = hold(points_1, points_2, *walls, poses, WALL_GATE, parameters.split_tolerance).sum(axis=1)
     strengths, directions = np.linalg.eigh(held)
     return (directions * np.maximum(strengths, 0.0)[:, None, :]) @ directions.swapaxes(1, 2)

@@ -9,13 +9,14 @@ import real_pairs
 import simulated
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from simulated import DEGREE, alone, exact, read_backwards, sight_map
+from simulated import DEGREE, alone, exact, off, perturbed, read_backwards, sight_map
 
-from segmap._field_kernels import MOVE_STEP, TURN_STEP, normal_equations
+from segmap._field_kernels import normal_equations
 from segmap._sight_kernels import classify
+from segmap._stepping import MOVE_STEP, TURN_STEP
 from segmap.fields import CELL, MOST_CELLS, field, look_up, refined
 from segmap.parameters import Parameters
-from segmap.pose import Pose2, wrap
+from segmap.pose import Pose2
 from segmap.scans import LaserScan
 from segmap.simulate import World
 from segmap.visibility import SURFACE_GAP, look, score, sighting, thinned
@@ -37,20 +38,6 @@ def views(world, T_1, T_2, **laser):
     """Fields and returns of two scans, in the order in which they are asked for."""
     seen = [seen_in(world, T, **laser) for T in (T_1, T_2)]
     return *(field(some, P) for some in seen), *(some.points for some in seen)
-
-
-def perturbed(truth, count, seed, distance=0.3, angle=8.0 * DEGREE):
-    """Poses up to so far from the true one."""
-    generator = np.random.default_rng(seed)
-    headings, lengths = generator.uniform(0.0, 2.0 * math.pi, count), generator.uniform(0.0, distance, count)
-    turns = generator.uniform(-angle, angle, count)
-    return np.array(tuple(truth)) + np.column_stack((lengths * np.cos(headings), lengths * np.sin(headings), turns))
-
-
-def off(poses, truth):
-    """Metres and radians between poses (k, 3) and the true one, at most."""
-    errors = poses - np.array(tuple(truth))
-    return np.hypot(errors[:, 0], errors[:, 1]).max(), np.abs(wrap(errors[:, 2])).max()
 
 
 # --- what is drawn --------------------------------------------------------------------------------

@@ -8,11 +8,12 @@ import pytest
 import simulated
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from simulated import DEGREE, alone, exact, read_backwards
+from simulated import DEGREE, alone, exact, off, perturbed, read_backwards
 
-from segmap._sight_kernels import nearest_segments, normal_equations
+from segmap._kernels import nearest_segments
+from segmap._sight_kernels import normal_equations
 from segmap.parameters import Parameters
-from segmap.pose import Pose2, wrap
+from segmap.pose import Pose2
 from segmap.refinement import distinct, information, refined, uncertainty
 from segmap.segments import SegmentMap, extract
 from segmap.simulate import World
@@ -24,20 +25,6 @@ BARE = World.build("bare", [(0.0, 0.0, 6.0, 5.0), (6.0, 1.0, 8.0, 3.0)])
 GATES = 0.5, 0.1
 MOVE, TURN = 0.3, 0.1
 """metres and radians: what refinement moves at most in one step"""
-
-
-def perturbed(truth, count, seed, distance=0.3, angle=8.0 * DEGREE):
-    """Poses up to so far from the true one."""
-    generator = np.random.default_rng(seed)
-    headings, lengths = generator.uniform(0.0, 2.0 * math.pi, count), generator.uniform(0.0, distance, count)
-    turns = generator.uniform(-angle, angle, count)
-    return np.array(tuple(truth)) + np.column_stack((lengths * np.cos(headings), lengths * np.sin(headings), turns))
-
-
-def off(poses, truth):
-    """Metres and radians between poses (k, 3) and the true one, at most."""
-    errors = poses - np.array(tuple(truth))
-    return np.hypot(errors[:, 0], errors[:, 1]).max(), np.abs(wrap(errors[:, 2])).max()
 
 
 def both_seen(world, T_1, T_2, **laser):

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from app.cli.options import Json, Preset, Setting, method_of, read_all
+from app.cli.options import Json, Logs, Out, Preset, Setting, Trajectory, method_of, read_all
 from app.cli.output import print_json, print_table, progress
 from app.cli.writing import described, listed, times_of, write_trajectory
 from segmap.export import Content, by_suffix, write_files
@@ -19,17 +18,6 @@ from segmap.segments import extract
 
 __all__ = ["map_logs"]
 
-Logs = Annotated[
-    list[Path],
-    typer.Argument(metavar="LOGS...", help="Laser logs, each in the order it was driven.", show_default=False),
-]
-Out = Annotated[
-    list[Path] | None,
-    typer.Option(metavar="FILE.EXT", help="Write the map, in the format the suffix says; can be given several times."),
-]
-Trajectory = Annotated[
-    Path | None, typer.Option(metavar="FILE.tum", help="Write the poses of the scans of the largest component.")
-]
 Workers = Annotated[int, typer.Option(min=1, max=256, help="Processes that match scans.")]
 
 

@@ -16,10 +16,13 @@ from app.cli.options import (
     DEFAULT_MODE,
     Heuristic,
     Json,
+    Logs,
     Method,
     Mode,
+    Out,
     Preset,
     Setting,
+    Trajectory,
     method_of,
     one_of,
     read_all,
@@ -39,10 +42,6 @@ from segmap.segments import SegmentMap, extract
 
 __all__ = ["merge"]
 
-Logs = Annotated[
-    list[Path],
-    typer.Argument(metavar="LOGS...", help="Laser logs, each in the order it was driven.", show_default=False),
-]
 MergingMethod = Annotated[str, typer.Option(metavar=one_of(METHODS), help="How a sequence of scans is merged.")]
 Stride = Annotated[
     int, typer.Option(min=1, metavar="N", help="Take every N-th scan; those between serve where a pair fails.")
@@ -53,13 +52,6 @@ Clean = Annotated[
 ]
 MostCalls = Annotated[
     int, typer.Option(min=1, metavar="N", help="Ask, or refuse, where a method would integrate more pairs of maps.")
-]
-Out = Annotated[
-    list[Path] | None,
-    typer.Option(metavar="FILE.EXT", help="Write the map, in the format the suffix says; can be given several times."),
-]
-Trajectory = Annotated[
-    Path | None, typer.Option(metavar="FILE.tum", help="Write the poses of the scans of the largest component.")
 ]
 Project = Annotated[
     Path | None,

@@ -22,10 +22,13 @@ __all__ = [
     "Heuristic",
     "Json",
     "Log",
+    "Logs",
     "Method",
     "Mode",
+    "Out",
     "Preset",
     "Setting",
+    "Trajectory",
     "method_of",
     "one_of",
     "open_log",
@@ -40,6 +43,19 @@ __all__ = [
 def one_of(names: Iterable[str]) -> str:
     """What stands for a choice in a command's help; the library says no to anything else."""
     return "|".join(names)
+
+
+Logs = Annotated[
+    list[Path],
+    typer.Argument(metavar="LOGS...", help="Laser logs, each in the order it was driven.", show_default=False),
+]
+Out = Annotated[
+    list[Path] | None,
+    typer.Option(metavar="FILE.EXT", help="Write the map, in the format the suffix says; can be given several times."),
+]
+Trajectory = Annotated[
+    Path | None, typer.Option(metavar="FILE.tum", help="Write the poses of the scans of the largest component.")
+]
 
 
 DEFAULT_MODE = "verified"

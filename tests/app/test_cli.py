@@ -17,7 +17,6 @@ import pytest
 from map_server import FREE, load_map
 
 import app.server
-from app.cli import main
 from app.resources import program_version, samples_folder
 from segmap.benchmark import is_right
 from segmap.export import FORMATS
@@ -36,19 +35,6 @@ RANGES = " ".join(["2.50"] * 90 + ["81.83"] * 90)
 RECORD = f"FLASER 180 {RANGES} 0 0 0 0 0 0 1.0 host 1.0\n"
 
 Run = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Run:
-    """Run the command in this process: exit status, standard output, standard error."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as stopped:
-            main([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        return int(stopped.value.code or 0), out, err
-
-    return run
 
 
 @pytest.fixture

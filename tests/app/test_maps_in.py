@@ -9,25 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from app.cli import main
 from app.resources import samples_folder
 from segmap.logs import read_maps
 from segmap.merging import Component, map_hash
 
 OFFICE = str(samples_folder() / "office.log")
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """Run the command in this process."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as stopped:
-            main([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        return int(stopped.value.code or 0), out, err
-
-    return run
 
 
 def test_integrate_takes_maps_in_place_of_scans(run: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.cli import main
 from app.resources import samples_folder
 from segmap.benchmark import is_right
 from segmap.fusion import spurious_length
@@ -25,19 +24,6 @@ OFFICE = samples_folder() / "office.log"
 COUNT = len(read_log(OFFICE))
 
 Run = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Run:
-    """Run the command in this process: exit status, standard output, standard error."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as stopped:
-            main([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        return int(stopped.value.code or 0), out, err
-
-    return run
 
 
 @pytest.fixture

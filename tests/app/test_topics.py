@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from bags import ROS_1, ROS_2, SCAN, laser_scan, write_ros1, write_ros2
 
-from app.cli import main
 from app.resources import samples_folder
 from segmap.logs import read_log
 from segmap.scans import LaserScan
@@ -40,19 +39,6 @@ def bag(held: tuple[LaserScan, ...], tmp_path: Path) -> Path:
     """A ROS 1 bag of both topics."""
     write_ros1(tmp_path / "run.bag", recorded(ROS_1, held))
     return tmp_path / "run.bag"
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """Run the command in this process."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as stopped:
-            main([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        return int(stopped.value.code or 0), out, err
-
-    return run
 
 
 def test_a_topic_is_named_behind_the_file(run: Any, bag: Path) -> None:

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from segmap.parameters import Parameters
-from segmap.pose import Pose2
+from segmap.pose import Pose2, wrap
 from segmap.scans import LaserScan
 from segmap.segments import SegmentMap, Sight, extract
 from segmap.simulate import Laser, Noise, World, box, cast, disc
@@ -69,3 +69,17 @@ def pair(world, T_w_1, T_w_2, parameters=None, seed=None, reach=30.0):
         for k, T in enumerate((T_w_1, T_w_2))
     ]
     return *(extract(scan, parameters) for scan in scans), T_w_1.inverse() @ T_w_2
+
+
+def perturbed(truth, count, seed, distance=0.3, angle=8.0 * DEGREE):
+    """Poses up to so far from the true one."""
+    generator = np.random.default_rng(seed)
+    headings, lengths = generator.uniform(0.0, 2.0 * math.pi, count), generator.uniform(0.0, distance, count)
+    turns = generator.uniform(-angle, angle, count)
+    return np.array(tuple(truth)) + np.column_stack((lengths * np.cos(headings), lengths * np.sin(headings), turns))
+
+
+def off(poses, truth):
+    """Metres and radians between poses (k, 3) and the true one, at most."""
+    errors = poses - np.array(tuple(truth))
+    return np.hypot(errors[:, 0], errors[:, 1]).max(), np.abs(wrap(errors[:, 2])).max()

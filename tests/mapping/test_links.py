@@ -5,15 +5,16 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from found import candidate, match, scans
+from simulated import noisy, other_room
 
+from segmap.consensus import voted
 from segmap.integration import Verdict
-from segmap.links import Link, Pace, agreed, links_by_scan, pace_of, placed_from, steps_between, voted
+from segmap.links import Link, Pace, agreed, links_by_scan, pace_of, placed_from, steps_between
 from segmap.parameters import preset
 from segmap.pose import Pose2
 from segmap.segments import extract
 from segmap.visibility import sighting
-from tests.helpers.found import candidate, match, scans
-from tests.helpers.simulated import noisy, other_room
 
 STEP = Pose2(0.6, 0.02, 0.05)
 WRONG = Pose2(4.0, 1.0, 2.0)

@@ -4,6 +4,8 @@ import math
 from itertools import pairwise
 
 import pytest
+from found import candidate, match, scans
+from simulated import noisy, other_room
 
 from segmap.integration import Verdict
 from segmap.links import Link, Pace
@@ -11,8 +13,6 @@ from segmap.loops import Gate, Promise, Scene, across, agreement, borne_out, clo
 from segmap.parameters import preset
 from segmap.pose import Pose2
 from segmap.segments import extract
-from tests.helpers.found import candidate, match, scans
-from tests.helpers.simulated import noisy, other_room
 
 REVIEW = {"verdict": Verdict.REVIEW, "confidence": 0.95}
 HERE = Pose2(1.0, 0.5, 0.3)

@@ -5,6 +5,8 @@ import math
 from pathlib import Path
 
 import pytest
+from found import scans
+from simulated import noisy, other_room
 
 from segmap.errors import CancelledError
 from segmap.keyframes import chained, keyframes, windows
@@ -14,8 +16,6 @@ from segmap.parameters import preset
 from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import extract
-from tests.helpers.found import scans
-from tests.helpers.simulated import noisy, other_room
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
 PARAMETERS = preset("verified")

@@ -1,6 +1,7 @@
 """Many pairs, on as many processes as one likes."""
 
 import pytest
+from simulated import noisy, other_room
 
 from segmap.errors import CancelledError, ParameterError
 from segmap.integration import match_maps
@@ -9,7 +10,6 @@ from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import extract
 from segmap.spreading import BATCH, spread
-from tests.helpers.simulated import noisy, other_room
 
 PARAMETERS = preset("verified")
 
