@@ -272,20 +272,24 @@ class Latest:
 
 
 class WarmUp:
-    """Compiles the kernels in a process of its own, so that threads find them compiled on disk.
+    """Compiles the kernels in processes of their own, so that threads find them compiled on disk.
 
-    Compilation takes seconds and holds the interpreter: in a thread it would hold up every page.
+    Compilation takes seconds and holds the interpreter: in a thread it would hold up every page. What matching
+    needs is waited for; what only some of it needs is compiled meanwhile.
     """
 
     def __init__(self, script: Path = WARM_UP_SCRIPT) -> None:
         self._script = script
-        self._process: subprocess.Popen[bytes] | None = None
+        self._processes: list[subprocess.Popen[bytes]] = []
 
     def start(self) -> None:
         """Begin; returns at once."""
+        self._processes = [self._compile("first"), self._compile("rest")]
+
+    def _compile(self, part: str) -> subprocess.Popen[bytes]:
         nowhere = subprocess.DEVNULL
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", str(self._script)],
+        return subprocess.Popen(
+            [sys.executable, "-P", str(self._script), part],
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             stdin=nowhere,
             stdout=nowhere,
@@ -293,8 +297,8 @@ class WarmUp:
         )
 
     def wait(self, check: Check = _nothing) -> None:
-        """Wait until the kernels are there. Should the process fail, threads compile for themselves."""
-        process = self._process
+        """Wait until the first kernels are there. Should the process fail, threads compile for themselves."""
+        process = self._processes[0] if self._processes else None
         while process is not None and process.poll() is None:
             check()
             with contextlib.suppress(subprocess.TimeoutExpired):
@@ -303,10 +307,10 @@ class WarmUp:
             log.warning("Compiling ahead ended with status %s: kernels are compiled when needed.", process.returncode)
 
     def close(self) -> None:
-        """Stop the process if it still runs."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
+        """Stop the processes that still run."""
+        for process in self._processes:
+            process.kill()
+            process.wait()
 
 
 def _join(threads: list[threading.Thread]) -> None:

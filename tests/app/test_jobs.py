@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.jobs import Backlog, Check, Latest, WarmUp
-from app.warm_up import warm_up
+from app.warm_up import first, rest
 from segmap import _bound_kernels, _search_kernels, _value_kernels
 from segmap.errors import CancelledError
 
@@ -256,7 +256,8 @@ def test_warming_up_is_waited_for(tmp_path: Path) -> None:
 
 def test_what_only_large_searches_need_is_compiled_too() -> None:
     """Bounds are used for many candidates only; small maps alone would leave their kernels to the first user."""
-    warm_up()
+    first()
+    rest()
     kernels = (_bound_kernels.paint, _search_kernels.look_up, _search_kernels.outlast, _value_kernels.crossing)
     assert all(kernel.signatures for kernel in kernels)
 

@@ -172,7 +172,18 @@ def test_a_real_log_while_it_is_matched(new_desk: Callable[..., Any], server: An
     desk.page.get_by_role("button", name="Resume").click()
     desk.until(lambda: server.get(f"/api{project}/integrations/{PAIR}")["match"] is not None, "a good pair")
     look_at(desk, PAIR)
+    for width in (1440, 1280, 1100, 950):
+        desk.page.set_viewport_size({"width": width, "height": 900})
+        assert desk.page.locator("#matching").is_visible()
+        assert right_edge(desk, "#help-open") <= width, f"the bar is wider than {width} pixels"
+    desk.page.set_viewport_size({"width": 1440, "height": 900})
+    look_at(desk, PAIR)
     desk.picture("workbench")
+
+
+def right_edge(desk: Any, selector: str) -> float:
+    """Where an element ends, pixels from the left."""
+    return float(desk.page.locator(selector).evaluate("element => element.getBoundingClientRect().right"))
 
 
 def look_at(desk: Any, integration: str) -> None:
