@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from segmap import _kernels
+from segmap import _kernels, tracing
 from segmap.errors import ParameterError
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, wrap
@@ -109,6 +109,7 @@ def _consecutive(segment_map: SegmentMap, parameters: Parameters) -> IntArray:
     else:
         kept = np.flatnonzero(long_enough) if parameters.consecutive_over_short else np.arange(len(lengths))
         pairs = _neighbours(kept, segment_map.order is Order.RING)
+    tracing.tell("consecutive", map=segment_map, long_enough=long_enough, pairs=pairs)
     return pairs[long_enough[pairs].all(axis=1)]
 
 
@@ -133,6 +134,7 @@ def _histogram(segment_map: SegmentMap, parameters: Parameters) -> IntArray:
     totals = np.bincount(bucket, weights=segment_map.lengths, minlength=slots)
     principal = int(np.argmax(totals))
     normal = (principal + slots // 2) % slots
+    tracing.tell("histogram", map=segment_map, buckets=bucket, totals=totals, principal=principal, normal=normal)
     pairs = np.stack(np.triu_indices(len(segment_map), k=1), axis=-1)
     first, second = bucket[pairs].T
     return pairs[((first == principal) & (second == normal)) | ((first == normal) & (second == principal))]
@@ -173,8 +175,11 @@ def angles(segment_map: SegmentMap, pairs: IntArray, parameters: Parameters, bot
         pairs = np.concatenate((pairs, pairs[:, ::-1]))
     pairs, headings = _with_headings(segment_map, pairs)
     usable = _meet(headings, parameters.min_vertex_angle)
+    tracing.tell("chosen", map=segment_map, pairs=pairs, headings=headings, usable=usable)
     pairs, headings = pairs[usable], headings[usable]
-    return Angles(pairs, headings, _vertices(segment_map, pairs, headings))
+    found = Angles(pairs, headings, _vertices(segment_map, pairs, headings))
+    tracing.tell("angles", map=segment_map, angles=found)
+    return found
 
 
 def _with_headings(segment_map: SegmentMap, pairs: IntArray) -> tuple[IntArray, FloatArray]:
@@ -225,9 +230,12 @@ def candidates(map_1: SegmentMap, map_2: SegmentMap, heuristic: str, parameters:
         blocks = _extreme_candidates(map_1, map_2)
     else:
         blocks = _paired_candidates(map_1, map_2, heuristic, parameters)
+    tracing.tell("heuristic", name=heuristic, map_1=map_1, map_2=map_2)
     seen = _Seen()
     for block in blocks:
-        yield block.take(seen.new(block.poses))
+        rows = seen.new(block.poses)
+        tracing.tell("candidates", block=block, new=rows)
+        yield block.take(rows)
 
 
 def _paired_candidates(
@@ -253,6 +261,7 @@ def _superimposed(angles_1: Angles, angles_2: Angles, parameters: Parameters) ->
         angles_2.vertices,
         parameters.angle_difference_tolerance,
     )
+    tracing.tell("equal", angles_1=angles_1, angles_2=angles_2, rows_1=rows_1, rows_2=rows_2)
     return Candidates(poses, angles_1.segments.take(rows_1, axis=0), angles_2.segments.take(rows_2, axis=0))
 
 
@@ -262,6 +271,7 @@ def _random_candidates(map_1: SegmentMap, map_2: SegmentMap, parameters: Paramet
     for k in range(1, parameters.random_rounds + 1):
         longest = parameters.segment_division_factor**k
         choices = [np.flatnonzero(m.lengths > longest * m.lengths.max(initial=0.0)) for m in (map_1, map_2)]
+        tracing.tell("round", k=k, share=longest, choices=choices)
         if min(len(choice) for choice in choices) < 2:
             continue
         draws = DRAWS * 2**k
@@ -302,11 +312,9 @@ def _equal_drawn(
     """The candidates of the draws whose angles have a vertex and are equal (lines 8 to 10)."""
     (pairs_1, headings_1), (pairs_2, headings_2) = drawn_1, drawn_2
     difference = np.diff(headings_1)[:, 0] - np.diff(headings_2)[:, 0]
-    keep = (
-        _meet(headings_1, parameters.min_vertex_angle)
-        & _meet(headings_2, parameters.min_vertex_angle)
-        & (np.abs(wrap(difference)) < parameters.angle_difference_tolerance)
-    )
+    meet = [_meet(headings, parameters.min_vertex_angle) for headings in (headings_1, headings_2)]
+    keep = meet[0] & meet[1] & (np.abs(wrap(difference)) < parameters.angle_difference_tolerance)
+    tracing.tell("draws", drawn_1=drawn_1, drawn_2=drawn_2, meet=meet, keep=keep)
     pairs_1, pairs_2 = pairs_1[keep], pairs_2[keep]
     headings_1, headings_2 = headings_1[keep], headings_2[keep]
     poses = _kernels.superimpose(

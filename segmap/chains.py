@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from segmap import tracing
 from segmap.evaluation import matching_values
 from segmap.parameters import Parameters
 from segmap.pose import IntArray, Pose2
@@ -43,7 +44,9 @@ def matching_chains(
     """The matching chains of two maps under ``T_1_2``, by their lowest segment of map 1."""
     pairs, values = matching_values(map_1, map_2, T_1_2, parameters)
     chains: dict[int, list[tuple[int, int, float]]] = {}
-    for label, (i, j), value in zip(components(pairs, len(map_1), len(map_2)), pairs, values, strict=True):
+    labels = components(pairs, len(map_1), len(map_2))
+    tracing.tell("chains", T_1_2=T_1_2, pairs=pairs, values=values, labels=labels)
+    for label, (i, j), value in zip(labels, pairs, values, strict=True):
         chains.setdefault(int(label), []).append((int(i), int(j), float(value)))
     return tuple(MatchingChain(tuple(chain)) for chain in chains.values())
 

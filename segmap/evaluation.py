@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from segmap import _value_kernels
+from segmap import _value_kernels, tracing
 from segmap._threads import Crew, crew
 from segmap.bounds import Bounds
 from segmap.parameters import Parameters
@@ -87,7 +87,9 @@ def search(
             values = task.values(poses)
             discarded = np.isnan(values)
         rows = best(values, count)
-        return Best(rows, values[rows], int(discarded.sum()))
+        found = Best(rows, values[rows], int(discarded.sum()))
+    tracing.tell("search", poses=poses, best=found)
+    return found
 
 
 def best(values: FloatArray, count: int) -> IntArray:

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from segmap import tracing
 from segmap.errors import MapError
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
@@ -182,12 +183,14 @@ def extract(scan: LaserScan, parameters: Parameters, log: int = 0, index: int = 
     coordinates = approximate(chunks, parameters.split_tolerance)
     lengths = np.hypot(*(coordinates[:, 2:] - coordinates[:, :2]).T)
     coordinates = coordinates[(lengths >= parameters.min_segment_length) & (lengths > LEAST_LENGTH)]
-    return SegmentMap(
+    segment_map = SegmentMap(
         coordinates,
         Order.RING if scan.all_round else Order.BEAMS,
         sources=tuple((Source(log, index, i),) for i in range(len(coordinates))),
         sights=(Sight(Pose2.identity(), scan),),
     )
+    tracing.tell("segments", scan=scan, points=points, clusters=chunks, map=segment_map)
+    return segment_map
 
 
 def clusters(points: FloatArray, cluster_distance: float, all_round: bool = False) -> list[FloatArray]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from segmap import tracing
 from segmap.fields import Field, field, look_up, refined
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray
@@ -103,6 +104,7 @@ def verify(seen: Views, poses: FloatArray, parameters: Parameters) -> Verified:
     kept = _distinct(moved, _order(seen, fine, moved, parameters), parameters, FINALISTS)
     final = refined(*seen.fields, *fine, moved[kept], FINAL_STEPS, FINAL_GATE, LAST_GATE)
     totals = look(seen.seen_1, seen.seen_2, final, parameters)
+    tracing.tell("refined", poses=poses, rows=rows, moved=moved, kept=kept, final=final, totals=totals)
     return Verified(rows[kept], final, totals, score(totals, parameters)).best(parameters)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from segmap import _kernels
+from segmap import _kernels, tracing
 from segmap.chains import MatchingChain
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
@@ -69,6 +69,7 @@ def fuse(
         polylines.append(polyline(members, parameters))
         parts.append(_as_map(polylines[-1], members, parameters))  # line 12
     fused = replace(SegmentMap.joined(parts), sights=map_1.sights + moved_2.sights)
+    tracing.tell("fused", moved_2=moved_2, chains=chains, polylines=polylines, parts=parts, map=fused)
     return Fusion(fused, tuple(polylines))
 
 
@@ -115,9 +116,11 @@ def _grown(members: SegmentMap, parameters: Parameters, again: bool) -> Polyline
     segments = members.coordinates
     waiting = np.ones(len(segments), bool)
     bound = len(segments) * (parameters.fusion_bound if again else 1)
+    tracing.tell("chain", members=members, again=again)
     squares, edges = _kernels.closest_edges(segments, vertices)
     for insertions in range(bound + 1):
         s = int(np.argmax(np.where(waiting, np.sqrt(squares), -1.0)))
+        tracing.tell("polyline", vertices=vertices, squares=squares, edges=edges, waiting=waiting, farthest=s)
         if not waiting[s] or math.sqrt(squares[s]) <= parameters.fusion_tolerance:
             return Polyline(vertices, directed, insertions, finished=True)
         if insertions < bound:

@@ -14,6 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from segmap import tracing
 from segmap.graph.arrays import EdgeArrays
 from segmap.graph.marginals import Marginals
 from segmap.graph.reattaching import reattached
@@ -86,6 +87,7 @@ def graduated(problem: Problem, poses: FloatArray, minimise: Minimise) -> FloatA
         weights[free] = _weights(squared[free], gate, convexity)
         poses = minimise(poses, weights, 1)
         squared = edges.squares(poses)
+        tracing.tell("optimised", edges=edges, poses=poses, weights=weights, squares=squared)
         problem.tell(Round(problem.loss(poses), int((weights < 0.5).sum()), poses))
         if (np.minimum(weights, 1.0 - weights) <= DECIDED).all():
             break
@@ -123,6 +125,7 @@ def settled(problem: Problem, poses: FloatArray, minimise: Minimise) -> tuple[Fl
             break
         weights, poses = new, minimise(poses, new, STEPS)
         loss = problem.loss(poses)
+        tracing.tell("optimised", edges=edges, poses=poses, weights=new, squares=squared)
         problem.tell(Round(loss, int((new < 0.5).sum()), poses))
         if loss < best:
             best, result = loss, (poses, new)

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from segmap import tracing
 from segmap.errors import CancelledError
 from segmap.integration import Match, Verdict, match_maps
 from segmap.merging.components import fused
@@ -162,7 +163,9 @@ class Maker:
         new = tuple(scan for scan in second.scans if scan not in first.poses)
         poses = {**first.poses, **{scan: step.T_1_2 @ second.poses[scan] for scan in new}}
         whole = fused(first.map, second.map, step.T_1_2, self.parameters)
-        return MergeNode(first.scans + new, poses, whole, step)
+        node = MergeNode(first.scans + new, poses, whole, step)
+        tracing.tell("joined", node=node)
+        return node
 
 
 def valid_pose(match: Match) -> Pose2 | None:
