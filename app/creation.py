@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -18,7 +19,7 @@ from segmap.project import ProjectState
 from segmap.scans import LaserLog
 from segmap.store import Store
 
-__all__ = ["Filled", "Source", "copy_project", "fill", "is_project"]
+__all__ = ["Filled", "Read", "Source", "copy_project", "fill", "is_project", "new_project", "put_in", "read_sources"]
 
 SQLITE = b"SQLite format 3\0"
 START = 1 << 16
@@ -33,9 +34,17 @@ class Source:
     file: BinaryIO
 
 
+@dataclass(frozen=True)
+class Read:
+    """Logs with the files they came from, and a sentence for each file that could not be read."""
+
+    logs: tuple[tuple[Source, LaserLog], ...]
+    failures: tuple[str, ...]
+
+
 @dataclass
 class Filled:
-    """What went into a new project: the logs as read, and what was left out of them."""
+    """What went into a project: the logs as read, and what was left out of them."""
 
     logs: dict[int, LaserLog] = field(default_factory=dict)
     problems: tuple[str, ...] = ()
@@ -48,27 +57,61 @@ def is_project(file: BinaryIO) -> bool:
     return start.startswith(SQLITE) and not ROS_2_BAG.recognises(start)
 
 
+def new_project(path: Path, title: str) -> None:
+    """A new project file at ``path``, without logs."""
+    _created(path, title).close()
+
+
 def fill(path: Path, title: str, sources: Sequence[Source], limits: Limits | None = None) -> Filled:
     """A new project file at ``path`` with all logs that can be read; a bag gives a log for each laser topic.
 
     Raises:
         LogError: none can be.
     """
-    logs, failures = _read(sources, limits)
-    if not logs:
+    read = read_sources(sources, limits)
+    if not read.logs:
+        raise LogError(" ".join(read.failures))
+    with _created(path, title) as store:
+        return _put(store, read)
+
+
+def _created(path: Path, title: str) -> Store:
+    return Store.create(path, title, preset(DEFAULT_PRESET[MODE]), DEFAULT_HEURISTIC[MODE], MODE)
+
+
+def put_in(store: Store, read: Read, who: str = "") -> Filled:
+    """Put more logs into a project; those that are in it already are left out.
+
+    Raises:
+        LogError: nothing is left.
+    """
+    held = {(log.sha256, log.topic) for log in store.state.logs}
+    new = [(source, log) for source, log in read.logs if (_digest(source), log.topic) not in held]
+    names = sorted({log.name for _, log in read.logs} - {log.name for _, log in new})
+    failures = (*read.failures, *(f"{name} is in this project already: it was left out." for name in names))
+    if not new:
         raise LogError(" ".join(failures))
-    filled = Filled(problems=tuple(failures))
-    with Store.create(path, title, preset(DEFAULT_PRESET[MODE]), DEFAULT_HEURISTIC[MODE], MODE) as store:
-        for source, log in logs:
-            source.file.seek(0)
-            info = store.add_log(log.name, source.file, scans=len(log), format=log.format, topic=log.topic)
-            remember(store, info, facts_of(log))
-            filled.logs[info.index] = log
-            filled.problems += tuple(f"{log.name}, {problem}" for problem in log.problems)
+    return _put(store, Read(tuple(new), failures), who)
+
+
+def _digest(source: Source) -> str:
+    source.file.seek(0)
+    return hashlib.file_digest(source.file, "sha256").hexdigest()  # type: ignore[arg-type]  # it is a real file
+
+
+def _put(store: Store, read: Read, who: str = "") -> Filled:
+    filled = Filled(problems=read.failures)
+    for source, log in read.logs:
+        source.file.seek(0)
+        info = store.add_log(log.name, source.file, scans=len(log), format=log.format, topic=log.topic, who=who)
+        remember(store, info, facts_of(log))
+        filled.logs[info.index] = log
+        filled.problems += tuple(f"{log.name}, {problem}" for problem in log.problems)
     return filled
 
 
-def _read(sources: Sequence[Source], limits: Limits | None) -> tuple[list[tuple[Source, LaserLog]], list[str]]:
+def read_sources(sources: Sequence[Source], limits: Limits | None = None) -> Read:
+    """All logs that can be read, and for the others why they cannot."""
     logs: list[tuple[Source, LaserLog]] = []
     failures = []
     for source in sources:
@@ -77,7 +120,7 @@ def _read(sources: Sequence[Source], limits: Limits | None) -> tuple[list[tuple[
             logs += [(source, log) for log in read_logs(source.file, base_name(source.name), limits)]
         except LogError as error:
             failures.append(str(error))
-    return logs, failures
+    return Read(tuple(logs), tuple(failures))
 
 
 def copy_project(file: BinaryIO, path: Path) -> ProjectState:

@@ -69,6 +69,12 @@ class Inputs:
         """All scans of all logs, in order."""
         return tuple(ScanId(info.index, i) for info in self._infos for i in range(info.scans))
 
+    def add(self, logs: Sequence[LogInfo], known: Mapping[int, LaserLog]) -> None:
+        """Take in logs that were added to the project; ``logs`` are all it has now."""
+        with self._reading:
+            self._logs.update(known)
+            self._infos = tuple(logs)
+
     def log(self, index: int) -> LaserLog:
         """A log of the project.
 

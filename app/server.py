@@ -24,7 +24,7 @@ from app.errors import RequestError
 from app.failures import answer_failures
 from app.jobs import WarmUp
 from app.resources import program_version, static_folder
-from app.routes import loops, pages, projects, review, stream, views
+from app.routes import keeping, loops, pages, projects, review, stream, views
 from app.schemas import Failure
 from app.security import UPLOAD_BYTES, WILDCARDS, Guard
 from app.services import Services
@@ -39,7 +39,16 @@ NEXT_PORTS = 20
 REAP_SECONDS = 10.0
 GRACE_SECONDS = 3
 SOCKET_BYTES = 64 * 1024 * 1024
-ROUTERS = (pages.router, projects.router, review.router, loops.router, stream.router, views.router, proxy.router)
+ROUTERS = (
+    pages.router,
+    projects.router,
+    keeping.router,
+    review.router,
+    loops.router,
+    stream.router,
+    views.router,
+    proxy.router,
+)
 
 
 def create_app(

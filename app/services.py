@@ -26,6 +26,13 @@ class Services:
         if self.warm_up is not None:
             self.warm_up.start()
 
+    def delete(self, project: str) -> None:
+        """Close the views of a project and set it aside. Raises UnknownError where there is none."""
+        session = self.workspace.open_session(project)
+        if session is not None:
+            self.views.close_of(session)
+        self.workspace.delete(project)
+
     def close(self) -> None:
         """Close scenes, sessions and processes."""
         if self.warm_up is not None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
 from app.changes import Change, changed, is_accepted, settings_of, told
 from app.claims import with_claim
+from app.creation import Filled, Source, put_in, read_sources
 from app.criterion import CRITERIA, Criterion
 from app.deciding import choose
 from app.errors import UnknownError
@@ -137,6 +138,22 @@ class Session(Steps):
         """What was found out about a log when it was read."""
         return self._inputs.facts(index)
 
+    def add_logs(self, sources: Sequence[Source], who: str = "") -> Filled:
+        """Put more logs into the project; what was left out of them is told.
+
+        Raises:
+            LogError: none can be read, or all are in the project already.
+        """
+        read = read_sources(sources)
+        with self._lock:
+            before = self._state
+            filled = put_in(self._store, read, who)
+            self._inputs.add(self._store.state.logs, filled.logs)
+            self._take_over(before)
+        self._tell({"type": "log", **told(self._state), "logs": [log.name for log in filled.logs.values()]})
+        self._progressed()
+        return filled
+
     # --- matches ----------------------------------------------------------------------------------
 
     def match(self, integration: str, heuristic: str | None = None) -> Match | None:
@@ -237,7 +254,8 @@ class Session(Steps):
     def subscribe(self, listener: Listener) -> Callable[[], None]:
         """Call ``listener`` with every event, from any thread, until what is given back is called.
 
-        Events are JSON-able and have a ``type``: match, decision, progress, graph, map, search, parameters or error.
+        Events are JSON-able and have a ``type``: match, decision, progress, graph, map, search, parameters,
+        project, log, deleted or error.
         """
         return self._listeners.add(listener)
 
@@ -245,6 +263,10 @@ class Session(Steps):
         """Wait until nothing is left to compute; False when the time, in seconds, ran out before."""
         parts = (self.loops, self._matching, self._map)
         return all(part.settle(timeout) for part in parts)
+
+    def leave(self) -> None:
+        """Tell everybody that the project was deleted and is about to be closed."""
+        self._tell({"type": "deleted"})
 
     def close(self) -> None:
         """Stop all work and close the project file."""
@@ -277,11 +299,16 @@ class Session(Steps):
         with self._lock:
             before = self._state
             self._store.append(event, expected_revision)
-            self._state = self._store.state
-            change = Change(self._state, changed(before, self._state))
-            self._version += 1
-            self._follow(change, before)
+            change = self._take_over(before)
         self._tell_change(before, change)
+        return change
+
+    def _take_over(self, before: ProjectState) -> Change:
+        """Let the state on the disk be the one in force."""
+        self._state = self._store.state
+        change = Change(self._state, changed(before, self._state))
+        self._version += 1
+        self._follow(change, before)
         return change
 
     def _follow(self, change: Change, before: ProjectState) -> None:
@@ -298,6 +325,8 @@ class Session(Steps):
 
     def _tell_change(self, before: ProjectState, change: Change) -> None:
         state = change.state
+        if before.name != state.name:
+            self._tell({"type": "project", **told(state), "name": state.name})
         if change.integrations:
             rows = [self.row(name).to_json() for name in change.integrations if name in self._rows]
             self._tell(

@@ -18,6 +18,7 @@ from segmap.events import (
     Proposal,
     Propose,
     Redo,
+    Rename,
     SetHeuristic,
     SetParameters,
     Undo,
@@ -124,6 +125,13 @@ class Steps(ABC):
             if (name, wanted) != (self._state.heuristic, self._state.mode):
                 change = self._commit(SetHeuristic(heuristic=name, mode=wanted, who=who))
             return change
+
+    def rename(self, name: str, *, who: str = "") -> Change:
+        """Give the project another name."""
+        with self._lock:
+            if name == self._state.name:
+                return Change(self._state)
+            return self._commit(Rename(name=name, who=who))
 
     def propose(self, proposals: Sequence[Proposal], *, who: str = "", reason: str = "", again: bool = True) -> Change:
         """Put pairs into the review queue, in one step; what is proposed so already stays as it is.

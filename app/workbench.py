@@ -38,7 +38,7 @@ __all__ = ["View"]
 
 DOUBLE_CLICK_SECONDS = 0.35
 """a decision so soon after the last one was meant for the pair that has just gone"""
-RELEVANT = ("decision", "map", "graph", "parameters")
+RELEVANT = ("decision", "map", "graph", "parameters", "log")
 """session events after which a view may look different"""
 
 
@@ -341,11 +341,11 @@ class View:
             self._look(replace(self._looks, **{"notice": "", **changes}))
 
     def _present(self, looks: Looks) -> Looks:
-        """The same, or the first pair of the queue where the one looked at was taken out of it."""
-        if looks.integration is None or looks.integration in self.session.integrations:
+        """The same, or the first pair of the queue where there is none, or it was taken out of the queue."""
+        if looks.integration in self.session.integrations:
             return looks
         rows = self.session.rows()
-        return looks.at(rows[0].id if rows else None)
+        return looks.at(rows[0].id) if rows else replace(looks, integration=None)
 
     def _look(self, looks: Looks) -> None:
         """Look at something else, and tell everybody."""

@@ -14,12 +14,14 @@ from pathlib import Path
 
 from platformdirs import user_data_path
 
-from app.creation import Source, copy_project, fill, is_project
+from app.creation import Source, copy_project, fill, is_project, new_project
 from app.errors import RequestError, UnknownError
 from app.jobs import WarmUp
 from app.samples import Samples
 from app.session import PICTURE, Session
-from segmap.errors import SegmapError
+from app.trash import Trash
+from segmap.errors import ProjectError, SegmapError
+from segmap.events import Rename
 from segmap.logs import ANY_SIZE, Limits, bag_in, base_name
 from segmap.project import ProjectState
 from segmap.scans import LaserLog
@@ -70,10 +72,12 @@ class Workspace:
     ) -> None:
         self._folder = (folder or default_folder()).absolute()
         self.samples = samples or Samples()
-        self._warm_up, self._open_session = warm_up, open_session
+        self._warm_up, self._new_session = warm_up, open_session
         self._lock = threading.RLock()
         self._sessions: dict[str, Session] = {}
         self._elsewhere: dict[str, Path] = {}
+        self._closed: dict[str, Path] = {}
+        self._trash = Trash(self._folder, SUFFIX)
         self._read: dict[Path, tuple[tuple[int, ...], Summary]] = {}
         self._known_logs: dict[str, dict[int, LaserLog]] = {}
 
@@ -133,11 +137,15 @@ class Workspace:
                 store = Store.open(self.check(id))
                 try:
                     known = self._known_logs.pop(id, {})
-                    self._sessions[id] = self._open_session(id, store, known_logs=known, warm_up=self._warm_up)
+                    self._sessions[id] = self._new_session(id, store, known_logs=known, warm_up=self._warm_up)
                 except BaseException:
                     store.close()
                     raise
             return self._sessions[id]
+
+    def open_session(self, id: str) -> Session | None:
+        """The session of a project where it is open."""
+        return self._sessions.get(id)
 
     def backup(self, id: str, target: Path) -> ProjectState:
         """Write a project into one new file, as it is now; work on it goes on. Returns the state written."""
@@ -173,6 +181,12 @@ class Workspace:
         sample = self.samples.get(name)
         with self.samples.opened(sample) as sources:
             return self._make(sample.title, sources)
+
+    def create_empty(self, name: str) -> Created:
+        """A project without logs, to be filled later."""
+        with self._new_file(name) as (id, path):
+            new_project(path, name)
+        return Created(id, name)
 
     def open_files(self, paths: Iterable[Path]) -> str:
         """The id of the project of some files given on the command line.
@@ -218,6 +232,73 @@ class Workspace:
         with self._new_file(name) as (id, path):
             state = copy_project(source.file, path)
         return Created(id, state.name)
+
+    # --- keeping ----------------------------------------------------------------------------------
+
+    def rename(self, id: str, name: str, who: str = "") -> None:
+        """Give a project another name; a step that can be undone in it. Raises UnknownError where there is none."""
+        path = self.check(id)
+        with self._lock:
+            session = self._sessions.get(id)
+            if session is not None:
+                session.rename(name, who=who)
+                return
+            with Store.open(path) as store:
+                if store.state.name != name:
+                    store.append(Rename(name=name, who=who))
+
+    def duplicate(self, id: str, name: str = "", who: str = "") -> Created:
+        """A copy of a project, as it is now, under another name.
+
+        Raises:
+            UnknownError: there is no such project.
+            ProjectError: its file cannot be read.
+        """
+        held = self.summary(id)
+        if held.state is None:
+            raise ProjectError(held.problem)
+        title = name or f"{held.state.name} (copy)"
+        with self._new_file(title) as (new, path):
+            self.backup(id, path)
+            with Store.open(path) as store:
+                store.append(Rename(name=title, who=who))
+        return Created(new, title)
+
+    def delete(self, id: str) -> None:
+        """Close a project and set it aside; one that lies elsewhere stays there and leaves the list.
+
+        Raises:
+            UnknownError: there is no such project.
+        """
+        with self._lock:
+            self.check(id)
+            session = self._sessions.pop(id, None)
+            if session is not None:
+                session.leave()
+                session.close()
+            if id in self._elsewhere:
+                self._closed[id] = self._elsewhere.pop(id)
+            else:
+                self._trash.put(id)
+
+    def deleted(self) -> list[Summary]:
+        """The projects that were deleted and can be had back."""
+        held = {**{id: self._trash.path(id) for id in self._trash.ids}, **self._closed}
+        return [_summary(id, path) for id, path in sorted(held.items())]
+
+    def restore(self, id: str) -> None:
+        """Undo a deletion. Raises UnknownError where there was none."""
+        with self._lock:
+            if id in self._closed:
+                self._elsewhere[id] = self._closed.pop(id)
+            else:
+                self._trash.take_back(id)
+
+    def remove(self, id: str) -> None:
+        """Remove a deleted project for good; a file that lies elsewhere stays. Raises UnknownError where it was not."""
+        with self._lock:
+            if self._closed.pop(id, None) is None:
+                self._trash.remove(id)
 
     @contextmanager
     def _new_file(self, title: str) -> Iterator[tuple[str, Path]]:

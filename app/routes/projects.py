@@ -13,7 +13,7 @@ from urllib.parse import quote
 from fastapi import APIRouter, Depends, Query
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, Response
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 from starlette.background import BackgroundTask
 from starlette.datastructures import UploadFile
 from starlette.requests import Request
@@ -23,7 +23,8 @@ from app.errors import UnknownError
 from app.loop_schemas import GraphBody, SearchBody
 from app.merged import exportable
 from app.pairs import pairs_in
-from app.routes.common import Opened, Site
+from app.project_schemas import NewProject
+from app.routes.common import Opened, Site, page_of
 from app.schemas import (
     Component,
     Counts,
@@ -82,27 +83,26 @@ def _summary(summary: Summary) -> ProjectSummary:
         scans=sum(log.scans for log in state.logs),
         integrations=counts,
         modified=state.modified,
-        url=_url(summary.id),
+        url=page_of(summary.id),
         problem=summary.problem,
     )
 
 
-def _url(id: str) -> str:
-    return f"/projects/{quote(id)}"
-
-
-async def _what_to_make(request: Request) -> AsyncIterator[list[UploadFile] | SampleChoice]:
-    """Uploaded files, spooled to disk as they come in and gone afterwards; or the name of a sample."""
+async def _what_to_make(request: Request) -> AsyncIterator[list[UploadFile] | SampleChoice | NewProject]:
+    """Uploaded files, spooled to disk as they come in and gone afterwards; or the name of a sample, or of a project."""
     if request.headers.get("content-type", "").startswith("multipart/form-data"):
         async with request.form(max_files=FILES, max_fields=FILES) as form:
             yield [file for file in form.getlist("files") if isinstance(file, UploadFile)]
     else:
-        yield _sample_choice(await request.body())
+        yield _choice(await request.body())
 
 
-def _sample_choice(body: bytes) -> SampleChoice:
+_CHOICE: TypeAdapter[SampleChoice | NewProject] = TypeAdapter(SampleChoice | NewProject)
+
+
+def _choice(body: bytes) -> SampleChoice | NewProject:
     try:
-        return SampleChoice.model_validate_json(body)
+        return _CHOICE.validate_json(body)
     except ValidationError as error:
         raise RequestValidationError(error.errors()) from None
 
@@ -120,19 +120,21 @@ def _sample_choice(body: bytes) -> SampleChoice:
                         "properties": {"files": {"type": "array", "items": {"type": "string", "format": "binary"}}},
                     }
                 },
-                "application/json": {"schema": SampleChoice.model_json_schema()},
+                "application/json": {"schema": _CHOICE.json_schema()},
             },
             "required": True,
         }
     },
 )
 def create(site: Site, wanted: Annotated[Any, Depends(_what_to_make)]) -> Created:
-    """A project of uploaded logs, of an uploaded project file, or of a sample."""
+    """A project of uploaded logs, of an uploaded project file, of a sample, or without logs."""
     if isinstance(wanted, SampleChoice):
         made = site.workspace.create_sample(wanted.sample)
+    elif isinstance(wanted, NewProject):
+        made = site.workspace.create_empty(wanted.name)
     else:
         made = site.workspace.create([Source(upload.filename or "log", upload.file) for upload in wanted])
-    return Created(id=made.id, name=made.name, url=_url(made.id), problems=list(made.problems))
+    return Created(id=made.id, name=made.name, url=page_of(made.id), problems=list(made.problems))
 
 
 @router.get("/samples")
