@@ -28,7 +28,8 @@ export function described(status, body) {
   return new ApiError(message, status, error?.kind ?? "");
 }
 
-async function call(url, options) {
+/** Ask the API for anything. */
+export async function call(url, options) {
   const response = await reach(url, options);
   if (!response.ok) throw await failure(response);
   return response.json();

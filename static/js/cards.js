@@ -2,6 +2,7 @@
 
 import { h } from "./dom.js";
 import { ago, count, whole } from "./format.js";
+import { projectMenu } from "./keeping.js";
 import { failed } from "./notices.js";
 
 const TALLY = ["accepted", "rejected", "pending"];
@@ -9,11 +10,11 @@ const TALLY = ["accepted", "rejected", "pending"];
 /** A card that stands where something is being loaded. */
 export const placeholder = () => h("li.card.placeholder", { "aria-hidden": "true" });
 
-/** A project: its map, its name, what it holds and when it last changed; one that cannot be opened says why. */
-export function projectCard(project) {
+/** A project: its map, its name, what it holds, when it last changed, and a menu; one that cannot be opened says why. */
+export function projectCard(project, changed) {
   const map = project.integrations.accepted ? `/api/projects/${encodeURIComponent(project.id)}/map.svg` : null;
   const title = h("h3", {}, project.problem ? project.name : h("a", { href: project.url }, project.name));
-  return h("li.card", {}, picture(map, "No map yet"), h("div.body", {}, title, project.problem ? h("p.trouble", {}, project.problem) : facts(project)));
+  return h("li.card", {}, picture(map, "No map yet"), h("div.body", {}, title, project.problem ? h("p.trouble", {}, project.problem) : facts(project)), projectMenu(project, changed));
 }
 
 function facts(project) {

@@ -3,12 +3,24 @@
 import { get, post } from "./api.js";
 import { placeholder, projectCard, sampleCard } from "./cards.js";
 import { byId, fill, h, text } from "./dom.js";
+import { create, showDeleted } from "./keeping.js";
+import { failed } from "./notices.js";
 import { dropZone } from "./upload.js";
 
 dropZone(byId("drop"), open);
 show(byId("projects"), listProjects);
 show(byId("samples"), listSamples);
-addEventListener("pageshow", (event) => event.persisted && show(byId("projects"), listProjects));
+byId("project-new").addEventListener("click", () => create(open));
+addEventListener("pageshow", (event) => event.persisted && refresh());
+
+/** Load the list again without emptying it first. */
+async function refresh() {
+  try {
+    fill(byId("projects"), await listProjects());
+  } catch (error) {
+    failed(error);
+  }
+}
 
 /** Fill a list; a list that cannot be loaded says why and offers to try again. */
 async function show(list, load) {
@@ -24,7 +36,8 @@ async function show(list, load) {
 async function listProjects() {
   const { projects } = await get("/api/projects");
   text(byId("projects-note"), projects.length ? "" : "None yet. Drop a log above, or open a sample.");
-  return projects.map(projectCard);
+  await showDeleted(refresh);
+  return projects.map((project) => projectCard(project, refresh));
 }
 
 async function listSamples() {

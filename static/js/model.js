@@ -9,7 +9,7 @@ const DECISION_PAUSE = 60;
 
 const VALUE = { parameter: "value_threshold", quantity: "value", unit: "m", maximum: null, step: 0.05 };
 
-/** Tells "info", "rows", "progress", "match", "graph", "search", "searched", "map", "parameters" and "trouble" as events. */
+/** Tells "info", "rows", "progress", "match", "graph", "search", "searched", "map", "parameters", "deleted" and "trouble" as events. */
 export class Project extends EventTarget {
   #said = false;
 
@@ -103,12 +103,23 @@ export class Project extends EventTarget {
     else if (event.type === "hello" || event.type === "log") this.refresh();
     else if (event.type === "graph") this.refresh(), this.tell("graph");
     else if (event.type === "search") this.#searched(event);
+    else if (event.type === "project") this.refreshInfo();
+    else if (event.type === "deleted") this.#end();
     else if (event.type === "map") this.refreshInfo(), this.tell("map");
     else if (event.type === "error") this.tell("trouble", new Error(event.message));
   }
 
   tell(type, detail = null) {
     this.dispatchEvent(new CustomEvent(type, { detail }));
+  }
+
+  /** The project was deleted: ask for nothing more. */
+  #end() {
+    for (const name of ["refreshInfo", "refreshRows"]) {
+      this[name].stop();
+      this[name] = () => {};
+    }
+    this.tell("deleted");
   }
 
   async #change(what, body) {
@@ -198,8 +209,13 @@ function coalesced(work, failed = () => {}) {
     clearTimeout(timer);
     if (!busy && pause < Infinity) timer = setTimeout(run, Math.max(0, finished + pause - performance.now()));
   };
-  return (asked = DECISION_PAUSE) => {
+  const ask = (asked = DECISION_PAUSE) => {
     pause = Math.min(pause, asked);
     schedule();
   };
+  ask.stop = () => {
+    pause = Infinity;
+    clearTimeout(timer);
+  };
+  return ask;
 }

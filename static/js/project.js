@@ -7,6 +7,8 @@ import { exportMenu } from "./exports.js";
 import { GraphWords, graphPanel, integrationLinks } from "./graph.js";
 import { head } from "./head.js";
 import { Heuristics } from "./heuristics.js";
+import { inputs } from "./inputs.js";
+import { restore } from "./keeping.js";
 import { listen, sheet } from "./keys.js";
 import { loops } from "./loops.js";
 import { Project } from "./model.js";
@@ -34,7 +36,7 @@ async function start() {
   new Detail(project, view, [candidates, new Heuristics(project), new GraphWords(project)]);
   new Threshold(project, queue);
   new ParameterDrawer(project);
-  for (const part of [head, summary, exportMenu, loops, graphPanel]) part(project, view);
+  for (const part of [head, summary, exportMenu, inputs, loops, graphPanel]) part(project, view);
   project.addEventListener("trouble", ({ detail }) => failed(detail));
   integrationLinks(byId("panel-map"), (id) => queue.select(id));
   keyboard();
@@ -46,6 +48,7 @@ async function start() {
 /** Open the view and its scene, and follow both from now on. */
 async function connect() {
   const stream = new Stream({ hear, lost, back, refused: () => again(stream) });
+  project.addEventListener("deleted", () => gone(stream));
   scene(view, { "?": help, "/": search, Escape: () => byId("queue").focus() });
   view.addEventListener("opened", () => listenTo(stream));
   view.addEventListener("changed", remember);
@@ -60,11 +63,32 @@ async function look(stream, integration) {
   try {
     if (project.rows.length) return await view.open(integration);
     cover("There is nothing to show: this project has no pair of scans.");
+    lookLater(stream);
     return listenTo(stream);
   } catch (error) {
     listenTo(stream);
     return cover(`The scene cannot be opened. ${error.message}`, () => look(stream, integration));
   }
+}
+
+/** Open the view as soon as there is a pair, as when logs are added. */
+function lookLater(stream) {
+  const begin = () => {
+    if (!project.rows.length) return;
+    project.removeEventListener("rows", begin);
+    look(stream, "");
+  };
+  project.addEventListener("rows", begin);
+}
+
+/** Somebody deleted the project: stop asking for it, say so, and offer to have it back. */
+function gone(stream) {
+  stream.close();
+  view.forget();
+  cover("");
+  const back = h("button.primary", { type: "button", onclick: () => restore(project, () => location.reload()).catch(failed) }, "Restore it");
+  const message = h("div.message.error", { role: "alert" }, h("p", {}, "This project was deleted."), h("div.row", {}, back, h("a.button", { href: "/" }, "All projects")));
+  byId("workbench").replaceChildren(h("div.unavailable", {}, message));
 }
 
 function listenTo(stream) {

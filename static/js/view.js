@@ -75,6 +75,11 @@ export class View extends EventTarget {
     if (this.id !== null) fetch(this.#url, { method: "DELETE", keepalive: true }).catch(() => {});
   }
 
+  /** The view is closed and there is nothing left to look at. */
+  forget() {
+    this.id = null;
+  }
+
   get #url() {
     return `/api/views/${encodeURIComponent(this.id)}`;
   }
