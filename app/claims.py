@@ -1,57 +1,57 @@
-"""Poses that were claimed for a pair, by a search or by another program: candidates beside our own match."""
+"""Poses no search on the pair found: claimed by a search on maps or by another program, or laid by hand."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
 
-import numpy as np
-
-from segmap.evaluation import matching_values
 from segmap.events import Proposal
 from segmap.integration import Candidate, Match
 from segmap.parameters import Parameters
+from segmap.placing import judged_at
 from segmap.pose import Pose2
-from segmap.refinement import uncertainties
 from segmap.segments import SegmentMap
-from segmap.verification import views
-from segmap.visibility import evidence, look, score
 
-__all__ = ["CLAIMED", "claimed_rank", "described", "judged_at", "with_claim"]
+__all__ = ["CLAIMED", "NUDGED", "claimed_rank", "described", "nudged_rank", "origin", "with_claim"]
 
 CLAIMED = -1
 """the ``index`` of a candidate that no search on this pair found"""
+NUDGED = -2
+"""the ``index`` of a candidate that a person laid by hand"""
 SAME = 1e-9
 """metres and radians; a claim that lies on a candidate is that candidate"""
 
 
-def judged_at(map_1: SegmentMap, map_2: SegmentMap, T_1_2: Pose2, parameters: Parameters, mode: str) -> Candidate:
-    """Any pose as a candidate: its value, and in verified mode its evidence."""
-    value = float(matching_values(map_1, map_2, T_1_2, parameters)[1].sum())
-    plain = Candidate(T_1_2, value, (0, 0), (0, 0), CLAIMED)
-    seen = views(map_1, map_2, parameters) if mode == "verified" else None
-    if seen is None:
-        return plain
-    poses = np.array([tuple(T_1_2)])
-    totals = look(seen.seen_1, seen.seen_2, poses, parameters)
-    held = uncertainties(map_1, map_2, seen.seen_1, seen.seen_2, poses, parameters)[0]
-    return replace(plain, score=float(score(totals, parameters)[0]), evidence=evidence(totals[0]), uncertainty=held)
+def origin(candidate: Candidate) -> str:
+    """Where a candidate comes from: ``found``, ``claimed`` or ``nudged``."""
+    return {CLAIMED: "claimed", NUDGED: "nudged"}.get(candidate.index, "found")
 
 
 def with_claim(
     match: Match, proposal: Proposal | None, maps: tuple[SegmentMap, SegmentMap], parameters: Parameters
 ) -> Match:
-    """A match with the claimed pose as its last candidate, unless our search found that very pose."""
-    if proposal is None or proposal.T_1_2 is None or claimed_rank(match, proposal) is not None:
+    """A match with the poses claimed, or laid by hand, as its last candidates, unless our search found the same."""
+    if proposal is None:
         return match
-    return replace(match, ranked=(*match.ranked, judged_at(*maps, proposal.T_1_2, parameters, match.mode)))
+    laid = None if proposal.nudge is None else proposal.nudge.T_1_2
+    for T_1_2, index in ((proposal.T_1_2, CLAIMED), (laid, NUDGED)):
+        if T_1_2 is not None and _rank_at(match, T_1_2) is None:
+            match = replace(match, ranked=(*match.ranked, judged_at(*maps, T_1_2, parameters, match.mode, index)))
+    return match
 
 
 def claimed_rank(match: Match, proposal: Proposal) -> int | None:
     """The rank of the candidate that lies where a proposal says; None where none does."""
-    if proposal.T_1_2 is None:
-        return None
-    near = (max(c.T_1_2.distance(proposal.T_1_2)) <= SAME for c in match.ranked)
+    return None if proposal.T_1_2 is None else _rank_at(match, proposal.T_1_2)
+
+
+def nudged_rank(match: Match, proposal: Proposal) -> int | None:
+    """The rank of the candidate that lies where a person laid it; None where nobody did."""
+    return None if proposal.nudge is None else _rank_at(match, proposal.nudge.T_1_2)
+
+
+def _rank_at(match: Match, T_1_2: Pose2) -> int | None:
+    near = (max(c.T_1_2.distance(T_1_2)) <= SAME for c in match.ranked)
     return next((rank for rank, same in enumerate(near) if same), None)
 
 
@@ -60,11 +60,11 @@ def described(match: Match | None, proposal: Proposal) -> str:
     said = {
         "closure": "Found by the search for loop closures",
         "imported": f"Imported from {proposal.source or 'a pose graph'}",
-        "manual": "Asked for by hand",
+        "manual": "Laid by hand" if proposal.nudge else "Asked for by hand",
     }[proposal.kind]
     if proposal.T_1_2 is None or match is None:
         return f"{said}."
-    own = next((c for c in match.ranked if c.index != CLAIMED), None)
+    own = next((c for c in match.ranked if c.index >= 0), None)
     if own is None:
         return f"{said}; our own match finds nothing to compare it with."
     distance, turn = own.T_1_2.distance(proposal.T_1_2)

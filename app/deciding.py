@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Literal, cast
 
-from app.claims import CLAIMED
+from app.claims import CLAIMED, origin
 from app.errors import RequestError, UnknownError
 from app.review import Outcome
 from segmap.errors import ProjectError
-from segmap.events import Choice, Covariance
+from segmap.events import Choice, Covariance, Grounds
 from segmap.integration import Candidate, Match
 from segmap.links import covariance_of
+from segmap.parameters import Parameters
 from segmap.pose import Pose2
 from segmap.project import ProjectState, Proposal
 
@@ -20,17 +21,25 @@ __all__ = ["Evidence", "choose", "covariance_at", "in_force"]
 
 @dataclass(frozen=True)
 class Evidence:
-    """A candidate: where it lies, what it is worth, and its rank."""
+    """A candidate: where it lies, what it is worth, its rank, and what speaks for and against it."""
 
     T_1_2: Pose2
     value: float
     rank: int | None
-    """None: not one of those our search found, but a pose that was claimed"""
+    """None: not one of those our search found, but a pose that was claimed, or laid by hand"""
     covariance: Covariance | None = None
+    origin: str = "found"
+    grounds: Grounds | None = None
 
     @classmethod
     def of(
-        cls, integration: str, rank: int, outcome: Outcome | None, match: Match | None, claim: Proposal | None = None
+        cls,
+        integration: str,
+        rank: int,
+        outcome: Outcome | None,
+        match: Match | None,
+        parameters: Parameters,
+        claim: Proposal | None = None,
     ) -> Evidence | None:
         """The candidate of a rank; None where there is no transformation (yet).
 
@@ -38,18 +47,29 @@ class Evidence:
             UnknownError: there are fewer candidates.
         """
         if rank == 0 and outcome is not None and outcome.pose is not None:
-            return cls(Pose2(*outcome.pose), outcome.value, 0, outcome.covariance)
+            grounds = _grounds_of_best(outcome, parameters)
+            return cls(Pose2(*outcome.pose), outcome.value, 0, outcome.covariance, grounds=grounds)
         if match is None or rank >= len(match.ranked):
             if rank == 0:
                 return None
             raise UnknownError(f"{integration} has no candidate of rank {rank}: look at its candidates again.")
         candidate = match.ranked[rank]
-        return cls(
-            candidate.T_1_2,
-            candidate.value,
-            None if candidate.index == CLAIMED else rank,
-            covariance_at(candidate, claim),
-        )
+        found, covariance = origin(candidate), covariance_at(candidate, claim)
+        place, grounds = rank if found == "found" else None, _grounds(candidate, match)
+        return cls(candidate.T_1_2, candidate.value, place, covariance, found, grounds)
+
+
+def _grounds_of_best(outcome: Outcome, parameters: Parameters) -> Grounds:
+    found = outcome.findings
+    seen = asdict(found.evidence) if found else {}
+    told = {"verdict": str(outcome.verdict(parameters)), "confidence": outcome.confidence}
+    return Grounds(**told, score=found.score if found else None, **seen, candidates=outcome.candidates)
+
+
+def _grounds(candidate: Candidate, match: Match) -> Grounds:
+    """Of any other candidate: the program's verdict and confidence are about the best alone."""
+    seen = asdict(candidate.evidence) if candidate.evidence else {}
+    return Grounds(score=candidate.score, **seen, candidates=match.candidates)
 
 
 def covariance_at(candidate: Candidate, claim: Proposal | None) -> Covariance | None:
@@ -76,7 +96,7 @@ def choose(
     """
     if verdict not in ("accepted", "rejected"):
         raise RequestError(f"{verdict!r} is no verdict: say accepted or rejected.")
-    evidence = Evidence.of(integration, rank, outcome, match, state.proposals.get(integration))
+    evidence = Evidence.of(integration, rank, outcome, match, state.parameters, state.proposals.get(integration))
     if evidence is None and verdict == "accepted":
         raise ProjectError(_why_not(integration, heuristic, outcome))
     return Choice(
@@ -89,6 +109,8 @@ def choose(
         value=evidence.value if evidence else None,
         candidate=evidence.rank if evidence else None,
         covariance=evidence.covariance if evidence else None,
+        origin=cast(Literal["found", "claimed", "nudged"], evidence.origin if evidence else "found"),
+        grounds=evidence.grounds if evidence else None,
     )
 
 

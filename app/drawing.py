@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from app import graph_layers, grid, map_layers, pair_layers
-from app.claims import CLAIMED
+from app.claims import NUDGED
 from app.content import Content, Pair, merit
 from app.drawables import Box, Drawable, Frame, label, lines
 from app.palette import RGB
@@ -162,8 +162,8 @@ def _candidate_caption(pair: Pair) -> str:
 
 
 def _angle_caption(pair: Pair) -> str:
-    if pair.candidate is not None and pair.candidate.index == CLAIMED:
-        return "none: this pose was claimed by somebody else"
+    if pair.candidate is not None and pair.candidate.index < 0:
+        return "none: this pose was laid by hand" if pair.candidate.index == NUDGED else "none: this pose was claimed"
     if pair.candidate is not None and len({*pair.candidate.angle_1}) == 1:
         return "the two segments this candidate lays on each other, extreme on extreme"
     return "the two angles this candidate superimposes, vertex on vertex"

@@ -7,7 +7,6 @@ from typing import Literal
 
 import numpy as np
 
-from app.claims import CLAIMED
 from app.content import Content, Pair, merit
 from app.drawables import Drawable, Frame, dashes, label, lines, points, star
 from segmap.candidates import angles
@@ -112,7 +111,7 @@ def sensors(content: Content) -> Iterator[Drawable]:
 def angle(content: Content) -> Iterator[Drawable]:
     """The segments of the two superimposed angles, marked, with their lines drawn on to the vertex."""
     pair = content.pair
-    if pair is None or pair.candidate is None or pair.candidate.index == CLAIMED:
+    if pair is None or pair.candidate is None or pair.candidate.index < 0:
         return
     sides = zip(FRAMES, pair.maps, (pair.candidate.angle_1, pair.candidate.angle_2), (4.5, 2.5), strict=True)
     for frame, segment_map, rows, thickness in sides:

@@ -320,6 +320,8 @@ class Detail(BaseModel):
     match: dict[str, Any] | None
     claimed: int | None
     """rank of the candidate that was claimed, and not found by our match"""
+    nudged: int | None
+    """rank of the one that was laid by hand"""
     told: list[str]
     """what the pose graph, and whoever proposed the pair, say of it"""
     heuristics: list[HeuristicResult]

@@ -159,13 +159,13 @@ class Session(Steps):
     def match(self, integration: str, heuristic: str | None = None) -> Match | None:
         """What was found for an integration; None: not computed yet. Default: by the project's heuristic.
 
-        A pose that somebody claims for the pair is its last candidate.
+        Poses that somebody claims for the pair, or laid by hand, are its last candidates.
         """
         found, state = self._matching.match(self._checked(integration), self._heuristic(heuristic)), self._state
         if found is None:
             return None
         judged, proposal = found.judged(state.parameters), state.proposals.get(integration)
-        if proposal is None or proposal.T_1_2 is None:
+        if proposal is None or (proposal.T_1_2 is None and proposal.nudge is None):
             return judged
         pair = IntegrationId.parse(integration)
         maps = self.segment_map(pair.first), self.segment_map(pair.second)

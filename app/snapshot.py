@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from app.claims import CLAIMED
+from app.claims import origin
 from app.content import Content, Pair
 from app.drawing import STAGES, Layer, layers
 from app.evidence import Evidence
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["snapshot"]
 
 
-NOTHING = ("candidate", "value", "pose", "angles", "claimed", "above", "score", "behind", "evidence", "uncertainty")
+NOTHING = ("candidate", "value", "pose", "angles", "origin", "above", "score", "behind", "evidence", "uncertainty")
 """null where no candidate is shown"""
 
 
@@ -78,7 +78,7 @@ def _candidate(content: Content) -> dict[str, Any]:
     pair = content.pair
     candidate = None if pair is None else pair.candidate
     if pair is None or candidate is None:
-        nothing = ("candidate", "value", "pose", "angles", "claimed", "above", "score", "behind")
+        nothing = ("candidate", "value", "pose", "angles", "origin", "above", "score", "behind")
         return {
             **dict.fromkeys((*nothing, "evidence", "uncertainty")),
             "candidates": 0 if pair is None else len(pair.ranked),
@@ -89,7 +89,7 @@ def _candidate(content: Content) -> dict[str, Any]:
         "value": candidate.value,
         "pose": _pose(candidate.T_1_2),
         "angles": [list(candidate.angle_1), list(candidate.angle_2)],
-        "claimed": candidate.index == CLAIMED,
+        "origin": origin(candidate),
         "above": _above(pair, candidate),
         "score": candidate.score,
         "behind": _behind(pair, candidate),

@@ -15,6 +15,7 @@ from segmap.events import (
     Clear,
     Decide,
     Event,
+    Nudge,
     Proposal,
     Propose,
     Redo,
@@ -143,7 +144,26 @@ class Steps(ABC):
         """
         with self._lock:
             held, known = self._state.proposals, set(self._integrations)
-            new = [p for p in proposals if held.get(p.integration) != p and (again or p.integration not in known)]
+            wanted = [_keeping_nudge(proposal, held.get(proposal.integration)) for proposal in proposals]
+            new = [p for p in wanted if held.get(p.integration) != p and (again or p.integration not in known)]
             if not new:
                 return Change(self._state)
             return self._commit(Propose(proposals=tuple(new), who=who, reason=reason))
+
+    def nudge(self, integration: str, nudge: Nudge, *, who: str = "", reason: str = "") -> Change:
+        """Let a pose a person laid by hand be a candidate of a pair, instead of the one laid before; one step.
+
+        Raises:
+            UnknownError: there is no such integration.
+        """
+        with self._lock:
+            held = self._state.proposals.get(self._listed(integration))
+            blank = held or Proposal(integration=integration, kind="manual")
+            return self.propose([blank.model_copy(update={"nudge": nudge})], who=who, reason=reason)
+
+
+def _keeping_nudge(proposal: Proposal, held: Proposal | None) -> Proposal:
+    """What is proposed anew says nothing of what was laid by hand: that stays."""
+    if proposal.nudge is not None or held is None:
+        return proposal
+    return proposal.model_copy(update={"nudge": held.nudge})

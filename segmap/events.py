@@ -44,8 +44,10 @@ __all__ = [
     "Decide",
     "Decision",
     "Event",
+    "Grounds",
     "IntegrationId",
     "LogInfo",
+    "Nudge",
     "Proposal",
     "Propose",
     "Redo",
@@ -150,6 +152,24 @@ class LogInfo(_Model):
     """sequence number of the event that added it; given when it is added"""
 
 
+class Grounds(_Model):
+    """The evidence a decision was made on, as the program had it then; None: not told in that mode."""
+
+    verdict: str | None = None
+    """the program's own, on the pose decided on: accepted, review or rejected"""
+    confidence: float | None = None
+    """that the pose is right, in 0..1"""
+    score: float | None = None
+    """support less conflict, metres"""
+    supported: float | None = None
+    """metres of wall, as lines of sight have it; so are the next three"""
+    contradicted: float | None = None
+    shadowed: float | None = None
+    unseen: float | None = None
+    candidates: int | None = None
+    """poses that were tried"""
+
+
 class Choice(_Model):
     """What somebody decides about one integration, with what it takes to do it again without a search."""
 
@@ -167,6 +187,9 @@ class Choice(_Model):
     """rank of the candidate, 0 for the best; None: not one of the ranked candidates"""
     covariance: Covariance | None = None
     """how well ``T_1_2`` is known, as the pose graph weighs it; None: nothing told"""
+    origin: Literal["found", "claimed", "nudged"] = "found"
+    """whether our search on the pair found the pose, somebody claimed it, or it was laid by hand"""
+    grounds: Grounds | None = None
 
     @model_validator(mode="after")
     def _placed(self) -> Self:
@@ -236,6 +259,17 @@ class AddLog(_Recorded):
     log: LogInfo
 
 
+class Nudge(_Model):
+    """Where a person laid the second scan of a pair."""
+
+    T_1_2: Pose2
+    """where it came to rest"""
+    start: Pose2
+    """where it was let go; the best nearby is where it came to rest"""
+    ties: tuple[tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]], ...] = ()
+    """the segments, of the first and of the second scan, that were laid on each other; none where it was dragged"""
+
+
 class Proposal(_Model):
     """A pair of scans that somebody, or a search, asks to be looked at."""
 
@@ -248,10 +282,14 @@ class Proposal(_Model):
     """how well that is known"""
     source: _Name = ""
     """for people: the file it came from, or what found it"""
+    nudge: Nudge | None = None
+    """where a person laid it, last"""
 
     @model_validator(mode="after")
     def _placed(self) -> Self:
-        _refuse_unplaced(self.integration, self.T_1_2)
+        laid = () if self.nudge is None else (self.nudge.T_1_2, self.nudge.start)
+        for T_1_2 in (self.T_1_2, *laid):
+            _refuse_unplaced(self.integration, T_1_2)
         return self
 
 

@@ -383,6 +383,8 @@ _PROPOSED = {"closure": "loop closures", "imported": "imported edges", "manual":
 def _described_proposals(proposals: _Change[Proposal | None]) -> str:
     """As in ``proposed 12 loop closures``, ``proposed 0.1-0.7``."""
     kinds = {after.kind for _, after in proposals.values() if after}
+    if all(after and after.nudge and after.nudge != (before and before.nudge) for before, after in proposals.values()):
+        return f"laid {next(iter(proposals))} by hand"
     if len(proposals) == 1:
         return f"proposed {next(iter(proposals))}"
     return f"proposed {len(proposals)} {_PROPOSED[kinds.pop()] if len(kinds) == 1 else 'pairs'}"

@@ -40,6 +40,7 @@ ORDER = (
     "verdict",
     "chains",
     "matches",
+    "placing",
     "explanation",
     "fusion",
     "integration",

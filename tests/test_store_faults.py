@@ -348,7 +348,7 @@ def test_what_version_2_brought_older_programs_refuse(tmp_path: Path, monkeypatc
         assert store.state.proposals == {"0.0-0.3": proposal}
         assert store.state.can_undo == "proposed 0.0-0.3"
     monkeypatch.setattr(_database, "MIGRATIONS", _database.MIGRATIONS[:1])
-    refused(path, lambda: Store.open(path), "written by a newer segmap (version 2 of the project file")
+    refused(path, lambda: Store.open(path), "written by a newer segmap (version 3 of the project file")
 
 
 def write_version_1(path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
 
-from app.claims import CLAIMED, described
+from app.claims import CLAIMED, NUDGED, described
 from app.routes.common import Opened
 from app.schemas import (
     DecisionMade,
@@ -49,10 +49,16 @@ def integration(
     return Detail(
         row=Integration.of(row),
         match=None if match is None else json.loads(match.to_json()),
-        claimed=next((rank for rank, c in enumerate(match.ranked) if c.index == CLAIMED), None) if match else None,
+        claimed=_rank_of(match, CLAIMED),
+        nudged=_rank_of(match, NUDGED),
         told=_told(session, integration, match),
         heuristics=_heuristics(session, integration),
     )
+
+
+def _rank_of(match: Match | None, index: int) -> int | None:
+    """Of the candidate that was claimed, or laid by hand."""
+    return next((rank for rank, c in enumerate(match.ranked) if c.index == index), None) if match else None
 
 
 def _told(session: Session, integration: str, match: Match | None) -> list[str]:

@@ -140,8 +140,9 @@ def candidate(snapshot: Snapshot) -> str:
         return _block(f'<span style="{FAINT}">No candidate</span>')
     rank = f"<b>Candidate {snapshot['candidate'] + 1}</b> of {snapshot['candidates']}"
     (a, b), (c, d) = snapshot["angles"]
-    if snapshot["claimed"]:
-        return _block(f'{rank}<div style="{NUMBERS}">{_pose(snapshot["pose"])}</div><div style="{FAINT}">claimed</div>')
+    if snapshot["origin"] != "found":
+        said = {"claimed": "claimed", "nudged": "laid by hand"}[snapshot["origin"]]
+        return _block(f'{rank}<div style="{NUMBERS}">{_pose(snapshot["pose"])}</div><div style="{FAINT}">{said}</div>')
     said = f"segment {a} laid on segment {c}" if a == b else f"angle of segments {a}, {b} on that of {c}, {d}"
     angles = f'<div style="{FAINT}">{said}</div>'
     return _block(f'{rank}<div style="{NUMBERS}">{_pose(snapshot["pose"])}</div>{angles}')

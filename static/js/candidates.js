@@ -27,9 +27,9 @@ export class Candidates {
     this.body.addEventListener("keydown", (event) => this.#key(event));
   }
 
-  show({ match, claimed }, view) {
+  show({ match, claimed, nudged }, view) {
     this.view = view;
-    this.#candidates = (match?.ranked ?? []).map((found, rank) => ({ ...found, rank, claimed: rank === claimed, pose: pose(found.T_1_2) }));
+    this.#candidates = (match?.ranked ?? []).map((found, rank) => ({ ...found, rank, claimed: rank === claimed, nudged: rank === nudged, pose: pose(found.T_1_2) }));
     text(byId("candidates-note"), note(match, this.#candidates.length));
     this.table.hidden = this.#candidates.length === 0;
     this.table.classList.toggle("unscored", match?.mode === "paper");
@@ -93,7 +93,8 @@ export class Candidates {
   }
 }
 
-function angles({ angle_1: first, angle_2: second, claimed }) {
+function angles({ angle_1: first, angle_2: second, claimed, nudged }) {
+  if (nudged) return "by hand";
   if (claimed) return "claimed";
   const told = (segments) => [...new Set(segments)].join("·");
   return `${told(first)} → ${told(second)}`;
