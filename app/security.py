@@ -2,8 +2,10 @@
 
 - The Host must be a name of this machine's loopback or the address bound: a foreign name that was
   made to point here (DNS rebinding) is refused.
-- The Origin of everything that can change something, and of every websocket, must be our own.
-- Bodies are bounded.
+- The Origin of everything that can change something, and of every websocket, must be our own; what only reads is
+  answered to our own pages and to whoever opens an address, not to pages of others that embed it.
+- Where other computers reach the server, the token of the link it printed (:mod:`app.access`).
+- Bodies are bounded in size and time (:mod:`app.incoming`).
 - Pages may load nothing from elsewhere, run nothing inline, and be framed by nobody else.
 """
 
@@ -13,13 +15,14 @@ import ipaddress
 from collections.abc import Iterable
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.exceptions import HTTPException
-from starlette.responses import JSONResponse
+from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.access import Access
+from app.incoming import MEBIBYTE, bounded, too_large
 
 __all__ = ["CONTENT_SECURITY_POLICY", "UPLOAD_BYTES", "Guard", "allowed_host", "own_origin"]
 
-MEBIBYTE = 1024 * 1024
 UPLOAD_BYTES = 256 * MEBIBYTE
 BODY_BYTES = MEBIBYTE
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
@@ -40,10 +43,16 @@ HEADERS = {
 
 
 class Guard:
-    """ASGI middleware: refuses foreign requests, bounds bodies, adds the headers an answer does not set itself."""
+    """ASGI middleware: refuses foreign requests, bounds bodies, adds the headers an answer does not set itself.
 
-    def __init__(self, app: ASGIApp, bound: str = "127.0.0.1", upload_bytes: int = UPLOAD_BYTES) -> None:
+    ``bound`` is the address the server listens at; ``token`` what it asks for, None: nothing.
+    """
+
+    def __init__(
+        self, app: ASGIApp, bound: str = "127.0.0.1", upload_bytes: int = UPLOAD_BYTES, token: str | None = None
+    ) -> None:
         self._app, self._bound, self._upload_bytes = app, bound, upload_bytes
+        self._access = Access(token)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
@@ -58,16 +67,20 @@ class Guard:
             await self._app(scope, receive, send)
         else:
             limit = self._limit(Headers(scope=scope))
-            await self._app(scope, _bounded(receive, limit), _with_headers(send))
+            await self._app(scope, bounded(receive, limit), _with_headers(send))
 
-    def _refusal(self, scope: Scope, headers: Headers) -> JSONResponse | None:
+    def _refusal(self, scope: Scope, headers: Headers) -> Response | None:
         if not allowed_host(headers.get("host"), self._bound):
             return _refused(403, "ForbiddenHost", "This address is not one the server answers to.")
         changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS
         if changes and not own_origin(headers):
             return _refused(403, "ForbiddenOrigin", "Requests from pages of another origin are refused.")
+        if not changes and not (_own_site(headers) or _opens_a_page(headers)):
+            return _refused(403, "ForbiddenOrigin", "Pages of another origin may embed nothing from here.")
+        if (answer := self._access.refusal(scope, headers)) is not None:
+            return answer
         if _declared_length(headers) > self._limit(headers):
-            return _refused(413, "TooLarge", _too_large(self._limit(headers)))
+            return _refused(413, "TooLarge", too_large(self._limit(headers)))
         return None
 
     def _limit(self, headers: Headers) -> int:
@@ -93,9 +106,19 @@ def own_origin(headers: Headers) -> bool:
     """Whether the Origin, if there is one, is that of the page's own address (the Host)."""
     origin = headers.get("origin")
     if origin is None:
-        return headers.get("sec-fetch-site", "none") in ("same-origin", "none")
+        return _own_site(headers)
     scheme, _, authority = origin.partition("://")
     return scheme in ("http", "https") and authority.lower() == headers.get("host", "").lower()
+
+
+def _own_site(headers: Headers) -> bool:
+    """Whether a browser says that our own page, or nobody's, made the request; older ones say nothing."""
+    return headers.get("sec-fetch-site", "none") in ("same-origin", "none")
+
+
+def _opens_a_page(headers: Headers) -> bool:
+    """Whether somebody follows a link to here in a window of its own."""
+    return headers.get("sec-fetch-mode") == "navigate" and headers.get("sec-fetch-dest") == "document"
 
 
 def _host_name(host: str) -> str:
@@ -118,21 +141,6 @@ def _declared_length(headers: Headers) -> int:
     return int(text) if text.isdecimal() else 0
 
 
-def _bounded(receive: Receive, limit: int) -> Receive:
-    """``receive`` that raises once the body is longer than ``limit`` bytes, whatever length was declared."""
-    seen = 0
-
-    async def bounded() -> Message:
-        nonlocal seen
-        message = await receive()
-        seen += len(message.get("body", b""))
-        if seen > limit:
-            raise HTTPException(413, _too_large(limit))
-        return message
-
-    return bounded
-
-
 def _with_headers(send: Send) -> Send:
     async def sending(message: Message) -> None:
         if message["type"] == "http.response.start":
@@ -146,10 +154,6 @@ def _with_headers(send: Send) -> Send:
 
 def _missing(headers: MutableHeaders, wanted: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
     return [(name, value) for name, value in wanted if name not in headers]
-
-
-def _too_large(limit: int) -> str:
-    return f"The request is larger than {limit // MEBIBYTE} MiB; open larger files on the command line: segmap serve."
 
 
 def _refused(status: int, kind: str, message: str) -> JSONResponse:

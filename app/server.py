@@ -8,7 +8,7 @@ import socket
 import sys
 import threading
 import webbrowser
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Iterable, Sequence
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.staticfiles import StaticFiles
 
 from app import proxy
+from app.access import PARAMETER, token_for
 from app.errors import RequestError
 from app.failures import answer_failures
 from app.jobs import WarmUp
@@ -31,7 +32,7 @@ from app.services import Services
 from app.views import Views
 from app.workspace import Workspace
 
-__all__ = ["create_app", "serve"]
+__all__ = ["create_app", "reached_at", "serve"]
 
 HOST = "127.0.0.1"
 PORT = 8000
@@ -58,11 +59,14 @@ def create_app(
     warm_up: WarmUp | None = None,
     bound: str = HOST,
     upload_bytes: int = UPLOAD_BYTES,
+    token: str | None = None,
 ) -> FastAPI:
     """The workbench on a folder of projects.
 
-    ``bound`` is the address it is reached at; ``warm_up`` compiles the kernels ahead, None: when needed.
+    ``bound`` is the address it listens at; any but loopback asks for ``token``, one of its own where none is given
+    (``app.state.token``). ``warm_up`` compiles the kernels ahead, None: when needed.
     """
+    token = token or token_for(bound)
     if not isinstance(workspace, Workspace):
         workspace = Workspace(workspace, warm_up=warm_up)
     services = Services(workspace, open_views or Views(), warm_up=warm_up)
@@ -75,12 +79,12 @@ def create_app(
         openapi_url="/api/openapi.json",
         responses={"4XX": {"model": Failure}},
     )
-    app.state.services = services
+    app.state.services, app.state.token = services, token
     for router in ROUTERS:
         app.include_router(router)
     app.mount("/static", StaticFiles(directory=static_folder()), name="static")
     answer_failures(app)
-    app.add_middleware(Guard, bound=bound, upload_bytes=upload_bytes)
+    app.add_middleware(Guard, bound=bound, upload_bytes=upload_bytes, token=token)
     return app
 
 
@@ -126,15 +130,17 @@ def serve(
     path = f"/projects/{projects_of.open_files(paths)}" if paths else "/"
     listening = _listen(host, port)
     app = create_app(projects_of, warm_up=warm_up, bound=host)
-    _Server(app, listening, f"http://{_authority(host, listening)}{path}", open_browser).run_until_stopped()
+    link = path if app.state.token is None else f"{path}?{PARAMETER}={app.state.token}"
+    urls = [f"http://{_authority(name, listening)}{link}" for name in reached_at(host)]
+    _Server(app, listening, urls, open_browser).run_until_stopped()
 
 
 class _Server(uvicorn.Server):
     """uvicorn that says where it is once it is there, and ends event streams before it waits for pages to go."""
 
-    def __init__(self, app: FastAPI, listening: socket.socket, url: str, open_browser: bool) -> None:
+    def __init__(self, app: FastAPI, listening: socket.socket, urls: Sequence[str], open_browser: bool) -> None:
         super().__init__(_config(app))
-        self._app, self._listening, self._url, self._open_browser = app, listening, url, open_browser
+        self._app, self._listening, self._urls, self._open_browser = app, listening, urls, open_browser
 
     def run_until_stopped(self) -> None:
         """Serve; Ctrl+C ends it."""
@@ -145,9 +151,14 @@ class _Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
         console = Console(stderr=True, soft_wrap=True)
-        console.print(Text.assemble("segmap is at ", (self._url, "bold"), "  (Ctrl+C ends it)"))
+        here, *elsewhere = self._urls
+        console.print(Text.assemble("segmap is at ", (here, "bold"), "  (Ctrl+C ends it)"))
+        for url in elsewhere:
+            console.print(Text.assemble("from other computers at ", (url, "bold")))
+        if self._app.state.token is not None:
+            console.print("Whoever has the link may read and change all projects here.")
         if self._open_browser:
-            threading.Thread(target=webbrowser.open, args=(self._url,), daemon=True).start()
+            threading.Thread(target=webbrowser.open, args=(here,), daemon=True).start()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         self._app.state.services.streams.close()
@@ -200,7 +211,21 @@ def _bind(host: str, port: int) -> socket.socket:
     return listening
 
 
+def reached_at(host: str) -> list[str]:
+    """The addresses to give people: of a server on all of them, this computer's to itself and to others."""
+    if host not in WILDCARDS:
+        return [host]
+    here, foreign, family = ("::1", "2001:db8::1", socket.AF_INET6) if host == "::" else _IPV4
+    with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as probe:
+        probe.connect((foreign, 9))  # sends nothing: the system only says which address it would send from
+        return list(dict.fromkeys((here, probe.getsockname()[0])))
+    return [here]
+
+
+_IPV4 = "127.0.0.1", "192.0.2.1", socket.AF_INET
+
+
 def _authority(host: str, listening: socket.socket) -> str:
-    """Host and port as they stand in an address; a server on all addresses is reached at this machine's own."""
-    name = "127.0.0.1" if host in WILDCARDS else host
-    return f"[{name}]:{listening.getsockname()[1]}" if ":" in name else f"{name}:{listening.getsockname()[1]}"
+    """Host and port as they stand in an address."""
+    port = listening.getsockname()[1]
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"

@@ -25,7 +25,13 @@ def serve(
         list[Path] | None,
         typer.Argument(metavar="[FILES]...", help="Logs that become one project, or a project.", show_default=False),
     ] = None,
-    host: Annotated[str, typer.Option(help="Address to listen at.")] = "127.0.0.1",
+    host: Annotated[
+        str,
+        typer.Option(
+            help="Address to listen at. Any but this computer's own asks for a token: it is in the link that is"
+            " printed (SEGMAP_TOKEN gives one that stays the same)."
+        ),
+    ] = "127.0.0.1",
     port: Annotated[
         int | None, typer.Option(min=0, max=65535, help="Port; default: 8000, or the next one that is free.")
     ] = None,
