@@ -20,6 +20,7 @@ from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Re
 from starlette.types import Scope
 
 from app.errors import RequestError
+from app.incoming import CLOSE
 from app.resources import static_folder
 
 __all__ = ["PARAMETER", "VARIABLE", "Access", "is_loopback", "token_for"]
@@ -74,7 +75,7 @@ class Access:
             return self._welcome(scope, headers)
         if "text/html" in headers.get("accept", ""):
             return FileResponse(static_folder() / "refused.html", 401)
-        return JSONResponse({"error": {"message": MISSING, "kind": "TokenMissing"}}, 401)
+        return JSONResponse({"error": {"message": MISSING, "kind": "TokenMissing"}}, 401, CLOSE)
 
     def _admitted(self, headers: Headers) -> bool:
         scheme, _, brought = headers.get("authorization", "").partition(" ")

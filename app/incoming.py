@@ -8,13 +8,15 @@ import time
 from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive
 
-__all__ = ["MEBIBYTE", "SECONDS", "SILENT_SECONDS", "bounded", "too_large"]
+__all__ = ["CLOSE", "MEBIBYTE", "SECONDS", "SILENT_SECONDS", "bounded", "too_large"]
 
 MEBIBYTE = 1024 * 1024
 SECONDS = 900.0
 """for all of a body; 256 MiB at 0.3 MiB a second"""
 SILENT_SECONDS = 60.0
 """without a byte of it"""
+CLOSE = {"Connection": "close"}
+"""with an answer that comes before the end of the request: what still comes of it is not waited for"""
 LATE = "The request did not arrive in time: try again, or open the files on the command line: segmap serve."
 
 
@@ -31,7 +33,7 @@ def bounded(receive: Receive, limit: int, seconds: float = SECONDS, silent: floa
         complete = not message.get("more_body", False)
         seen += len(message.get("body", b""))
         if seen > limit:
-            raise HTTPException(413, too_large(limit))
+            raise HTTPException(413, too_large(limit), CLOSE)
         return message
 
     return next_piece
@@ -42,7 +44,7 @@ async def _in_time(receive: Receive, seconds: float) -> Message:
         async with asyncio.timeout(max(seconds, 0.0)):
             return await receive()
     except TimeoutError:
-        raise HTTPException(408, LATE) from None
+        raise HTTPException(408, LATE, CLOSE) from None
 
 
 def too_large(limit: int) -> str:

@@ -19,7 +19,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.access import Access
-from app.incoming import MEBIBYTE, bounded, too_large
+from app.incoming import CLOSE, MEBIBYTE, bounded, too_large
 
 __all__ = ["CONTENT_SECURITY_POLICY", "UPLOAD_BYTES", "Guard", "allowed_host", "own_origin"]
 
@@ -157,4 +157,4 @@ def _missing(headers: MutableHeaders, wanted: Iterable[tuple[str, str]]) -> list
 
 
 def _refused(status: int, kind: str, message: str) -> JSONResponse:
-    return JSONResponse({"error": {"message": message, "kind": kind}}, status)
+    return JSONResponse({"error": {"message": message, "kind": kind}}, status, CLOSE)

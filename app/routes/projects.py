@@ -274,10 +274,11 @@ def download(site: Site, project: str) -> FileResponse:
 
 def _attached(name: str, suffix: str) -> dict[str, str]:
     """The header that saves an answer as a file of this name; what a name may not hold is encoded."""
-    file = f"{base_name(name)}{suffix}"
-    return {"Content-Disposition": f"attachment; filename=\"{_plain(file)}\"; filename*=utf-8''{quote(file, safe='')}"}
+    plain, full = _plain(name) + suffix, quote(base_name(name) + suffix, safe="")
+    return {"Content-Disposition": f"attachment; filename=\"{plain}\"; filename*=utf-8''{full}"}
 
 
 def _plain(name: str) -> str:
-    """A name that every file system takes."""
-    return "".join(c if c.isascii() and (c.isalnum() or c in " ._-") else "_" for c in base_name(name))
+    """A name that every file system takes, and shows."""
+    plain = "".join(c if c.isascii() and (c.isalnum() or c in " ._-") else "_" for c in base_name(name))
+    return plain.lstrip(" .-_") or "map"

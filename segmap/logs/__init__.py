@@ -71,6 +71,7 @@ PACKED = {
     b"7z\xbc\xaf": "a 7z archive",
     b"\x1f\x8b": "compressed twice",
 }
+TAR, TAR_AT = b"ustar", 257
 
 
 def read_log(
@@ -162,6 +163,7 @@ def _empty(file: LogFile, problems: Problems) -> LaserLog:
 
 
 def _format_of(head: bytes, file: LogFile) -> Format:
+    _refuse_packed(head, file.name)
     format = next((format for format in FORMATS if format.recognises(head)), None)
     if head.startswith(SQLITE) and format is not ROS_2_BAG:
         raise LogError(f"{file.name} is a database, but no ROS 2 bag: a project is opened alone, with segmap serve.")
@@ -171,9 +173,6 @@ def _format_of(head: bytes, file: LogFile) -> Format:
         raise LogError(f"{file.name} holds segment maps, not laser scans: give it where maps are asked for.")
     if is_pose_graph(head):
         raise LogError(f"{file.name} holds a pose graph without laser scans: give the log it was made from.")
-    for magic, packed in PACKED.items():
-        if head.startswith(magic):
-            raise LogError(f"{file.name} is {packed}: unpack it and give the log inside.")
     cut = f", and the file is {file.damage}" if file.damage else ""
     start = head.split(b"\n", 1)[0].strip()
     found = "it is binary" if b"\0" in head else f"line 1 starts with {shown(start)}"
@@ -181,6 +180,15 @@ def _format_of(head: bytes, file: LogFile) -> Format:
     raise LogError(
         f"{file.name} is no laser log that segmap reads: {found}{cut}. Expected {expected}, plain or gzipped."
     )
+
+
+def _refuse_packed(head: bytes, name: str) -> None:
+    """Archives are told of before what lies in them in the clear is taken for a log."""
+    found = [packed for magic, packed in PACKED.items() if head.startswith(magic)]
+    if head[TAR_AT:].startswith(TAR):
+        found.append("a tar archive")
+    if found:
+        raise LogError(f"{name} is {found[0]}: unpack it and give the log inside.")
 
 
 def _last_line(records: Sequence[Record]) -> int:

@@ -6,6 +6,8 @@ import { count } from "./format.js";
 import { sentence } from "./problems.js";
 
 const KINDS = "CARMEN and DP-SLAM logs, ROS bags (.bag, .db3, .mcap), CSV or JSON of ranges; or a .segmap project. Several files become one project.";
+const MEBIBYTES = 256; // the server takes no more at once
+const TOO_LARGE = `These files have more than ${MEBIBYTES} MiB. Open them on the command line, where any size is read: segmap serve FILES`;
 
 /** Make `zone` accept logs; `open(project)` is called with the project made of them. */
 export function dropZone(zone, open) {
@@ -39,14 +41,19 @@ function idle(zone, input, message = null) {
 
 async function upload(zone, input, files, open) {
   if (!files.length) return;
+  if (files.reduce((sum, file) => sum + file.size, 0) > MEBIBYTES << 20) return refuse(zone, input, TOO_LARGE);
   const meter = loading(zone, files);
   try {
     const project = await send(files, meter);
     if (project.problems?.length) idle(zone, input, readWithProblems(project, open));
     else open(project);
   } catch (error) {
-    idle(zone, input, h("div.message.error", { role: "alert" }, h("p", {}, error.message)));
+    refuse(zone, input, error.message);
   }
+}
+
+function refuse(zone, input, message) {
+  idle(zone, input, h("div.message.error", { role: "alert" }, h("p", {}, message)));
 }
 
 /** Show the progress of an upload; returns the function that moves it (share 0..1). */

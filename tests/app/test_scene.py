@@ -163,9 +163,18 @@ def test_it_listens_on_the_loopback_only(scene: Scene) -> None:
     assert scene.port > 0
 
 
-def test_no_tunnel_leads_outside(scene: Scene) -> None:
-    """Whatever a page asks for."""
-    assert scene._server.request_share_url() is None
+def test_no_tunnel_leads_outside(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A page that asks viser to share the scene with the world, as its own button would, gets nothing."""
+    opened: list[Any] = []
+    monkeypatch.setattr("viser._viser.ViserTunnel", lambda *given, **_: opened.append(given))
+    asked: list[bool] = []
+    original = scene._server.request_share_url
+    monkeypatch.setattr(scene._server, "request_share_url", lambda: (original(), asked.append(True))[0])
+    message = viser._messages.ShareUrlRequest()
+    for handler in scene._server._websock_server._incoming_handlers[type(message)]:
+        handler(0, message)  # type: ignore[arg-type]
+    until(lambda: bool(asked))
+    assert opened == []
 
 
 def test_it_prints_nothing(view: View, capfd: pytest.CaptureFixture[str]) -> None:

@@ -11,8 +11,8 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -48,9 +48,9 @@ class Running:
 
 
 @contextmanager
-def running(*arguments: str) -> Iterator[Running]:
+def running(*arguments: str, **environment: str) -> Iterator[Running]:
     """``segmap serve`` until the test is done with it."""
-    environment = {**os.environ, "PYTHONWARNINGS": "error"}
+    environment = {**os.environ, "PYTHONWARNINGS": "error", **environment}
     command = [sys.executable, "-c", SERVE, *arguments]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment) as process:
         try:
@@ -197,3 +197,56 @@ def test_a_page_that_does_not_read_is_cut_off() -> None:
         return len([text async for text in stream])
 
     assert asyncio.run(listen()) == 0
+
+
+# --- large uploads --------------------------------------------------------------------------------
+
+GIBIBYTE = 1 << 30
+START = b'--x\r\nContent-Disposition: form-data; name="files"; filename="big.log"\r\n\r\n'
+FORM = "POST /api/projects HTTP/1.1\r\nHost: {}\r\nContent-Type: multipart/form-data; boundary=x\r\n{}\r\n\r\n"
+
+
+def peak_mebibytes(server: Running) -> int:
+    """The most memory the server has had."""
+    status = Path(f"/proc/{server.process.pid}/status").read_text()
+    return int(re.search(r"VmHWM:\s+(\d+) kB", status)[1]) >> 10  # type: ignore[index]
+
+
+def answered(connection: socket.socket) -> bytes:
+    """What has been answered, until the other side closes."""
+    pieces = []
+    with suppress(ConnectionError):
+        while piece := connection.recv(1 << 16):
+            pieces.append(piece)
+    return b"".join(pieces)
+
+
+def test_a_gibibyte_is_refused(tmp_path: Path) -> None:
+    """By its declared length before any of it is read; without one, at the bound: never in memory, and gone then."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    with running(str(tmp_path / "projects"), TMPDIR=str(folder)) as server:
+        host, _, port = server.base.removeprefix("http://").partition(":")
+        address = (host, int(port))
+        before = httpx.get(server.base).status_code and peak_mebibytes(server)
+        with socket.create_connection(address, timeout=PATIENCE) as connection:
+            connection.sendall(FORM.format(f"{host}:{port}", f"Content-Length: {GIBIBYTE}").encode())
+            assert b" 413 " in answered(connection)[:20]
+        piece = bytes(1 << 20)
+        with socket.create_connection(address, timeout=PATIENCE) as connection:
+            connection.sendall(FORM.format(f"{host}:{port}", "Transfer-Encoding: chunked").encode())
+            sent = sending(connection, (START, *(piece,) * 1024))
+            assert sent < 400 << 20
+        assert httpx.get(f"{server.base}/api/projects").json() == {"projects": []}
+        assert peak_mebibytes(server) < before + 64
+    assert list(folder.iterdir()) == []
+
+
+def sending(connection: socket.socket, pieces: Iterable[bytes]) -> int:
+    """Send pieces as chunks; how many bytes the other side took before it had enough."""
+    sent = 0
+    with suppress(ConnectionError):
+        for piece in pieces:
+            connection.sendall(b"%x\r\n%b\r\n" % (len(piece), piece))
+            sent += len(piece)
+    return sent
