@@ -28,6 +28,10 @@ PREPARING = "Getting ready; the first time this takes some seconds."
 IRRELEVANT = {*THRESHOLDS, "fusion_tolerance", "fusion_variant", "fusion_bound", "max_connector", "pivot_form"}
 """parameters no candidate's value depends on"""
 EVIDENCE = {
+    "use_sights",
+    "use_refinement",
+    "use_rivals",
+    "use_confidence",
     "sight_tolerance",
     "shadow_depth",
     "conflict_weight",

@@ -1,4 +1,4 @@
-"""The inner loops over beams: lines of sight and refinement. Same rules as :mod:`segmap._kernels`."""
+"""The inner loops over beams: lines of sight. Same rules as :mod:`segmap._kernels`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from segmap._stepping import step_down
 from segmap.pose import FloatArray, IntArray
 
 __all__ = [
@@ -21,15 +20,11 @@ __all__ = [
     "classify",
     "distinct",
     "look",
-    "normal_equations",
-    "refine",
     "witnesses",
 ]
 
 SUPPORTED, CONTRADICTED, SHADOWED, UNSEEN = range(4)
 CLASSES = 4
-NEIGHBOURS = 3
-"""beams to either side of a point's own in which refinement looks for its surface"""
 
 _compiled = njit(cache=True, nogil=True, error_model="numpy")
 _inlined = njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -165,20 +160,28 @@ def look(
     Of a map of several scans everything that is judged counts, and no more is unseen than one scan would have.
     """
     totals = np.zeros((len(poses), CLASSES))
+    kinds_1 = np.empty(len(sighting_1.points), np.int64)
+    kinds_2 = np.empty(len(sighting_2.points), np.int64)
     for k in range(len(poses)):
-        cosine = math.cos(poses[k, 2])
-        sine = math.sin(poses[k, 2])
-        x = poses[k, 0]
-        y = poses[k, 1]
-        _add_classes(totals[k], sighting_2, cosine, sine, x, y, sighting_1, tolerance, gap, depth)
-        back_x = -cosine * x - sine * y
-        back_y = sine * x - cosine * y
-        _add_classes(totals[k], sighting_1, cosine, -sine, back_x, back_y, sighting_2, tolerance, gap, depth)
+        _look_at(sighting_1, sighting_2, poses[k], tolerance, gap, depth, totals[k], kinds_1, kinds_2)
     return totals
 
 
 @_compiled
-def _add_classes(totals, seen, cosine, sine, x, y, by, tolerance, gap, depth):  # type: ignore[no-untyped-def]
+def _look_at(sighting_1, sighting_2, pose, tolerance, gap, depth, totals, kinds_1, kinds_2):  # type: ignore[no-untyped-def]
+    """Add the metres by class, and set the class of each point of both maps, at one pose."""
+    cosine = math.cos(pose[2])
+    sine = math.sin(pose[2])
+    x = pose[0]
+    y = pose[1]
+    _add_classes(totals, kinds_2, sighting_2, cosine, sine, x, y, sighting_1, tolerance, gap, depth)
+    back_x = -cosine * x - sine * y
+    back_y = sine * x - cosine * y
+    _add_classes(totals, kinds_1, sighting_1, cosine, -sine, back_x, back_y, sighting_2, tolerance, gap, depth)
+
+
+@_compiled
+def _add_classes(totals, kinds, seen, cosine, sine, x, y, by, tolerance, gap, depth):  # type: ignore[no-untyped-def]
     """Add the metres of one map's points, moved into the frame of another map's sensors, by class."""
     points = seen.points
     before = totals[UNSEEN]
@@ -187,6 +190,7 @@ def _add_classes(totals, seen, cosine, sine, x, y, by, tolerance, gap, depth):  
         px = cosine * points[q, 0] - sine * points[q, 1] + x
         py = sine * points[q, 0] + cosine * points[q, 1] + y
         found = _class_of(px, py, by.beams, by.sensors, tolerance, gap, depth)
+        kinds[q] = found
         totals[found] += points[q, 2]
         judged += points[q, 2] if found != UNSEEN else 0.0
     if len(seen.sensors) > 1:
@@ -227,154 +231,3 @@ def distinct(poses: FloatArray, order: IntArray, distance: float, angle: float, 
             kept[count] = k
             count += 1
     return kept[:count]
-
-
-# --- refinement: robust point-to-line least squares, both ways -----------------------------------
-
-
-@_compiled
-def _surface_line(x, y, beam, beams, sensors, s, gate, gap, line):  # type: ignore[no-untyped-def]
-    """The line of the surface nearest to a point of the sensor's frame: ``line`` = nx, ny, offset; its distance."""
-    nearest = gate
-    for step in range(-NEIGHBOURS, NEIGHBOURS + 1):
-        a = _wrapped(beam + step, sensors, s)
-        b = _wrapped(beam + step + 1, sensors, s)
-        if a < 0 or b < 0 or math.isnan(beams[a, 2]) or math.isnan(beams[b, 2]):
-            continue
-        ex = beams[b, 0] - beams[a, 0]
-        ey = beams[b, 1] - beams[a, 1]
-        squared = ex * ex + ey * ey
-        if squared == 0.0 or (squared > gap * gap and beams[a, 5] == 0.0):
-            continue
-        dx = x - beams[a, 0]
-        dy = y - beams[a, 1]
-        share = (dx * ex + dy * ey) / squared
-        if share < -0.5 or share > 1.5:
-            continue
-        share = min(1.0, max(0.0, share))
-        distance = math.sqrt((dx - share * ex) ** 2 + (dy - share * ey) ** 2)
-        if distance < nearest:
-            nearest = distance
-            _line_through(beam + step, beams, sensors, s, gap, line)
-    return nearest
-
-
-@_compiled
-def _line_through(beam, beams, sensors, s, gap, line):  # type: ignore[no-untyped-def]
-    """The line through two neighbouring returns, over one more on either side where the surface goes on."""
-    a = _wrapped(beam, sensors, s)
-    b = _wrapped(beam + 1, sensors, s)
-    before = _wrapped(beam - 1, sensors, s)
-    after = _wrapped(beam + 2, sensors, s)
-    if before >= 0 and _near(beams, before, a, gap):
-        a = before
-    if after >= 0 and _near(beams, b, after, gap):
-        b = after
-    ex = beams[b, 0] - beams[a, 0]
-    ey = beams[b, 1] - beams[a, 1]
-    length = max(math.sqrt(ex * ex + ey * ey), 1e-12)
-    line[0] = -ey / length
-    line[1] = ex / length
-    line[2] = 0.5 * (line[0] * (beams[a, 0] + beams[b, 0]) + line[1] * (beams[a, 1] + beams[b, 1]))
-
-
-@_inlined
-def _near(beams, a, b, gap):  # type: ignore[no-untyped-def]
-    """Whether the surface goes on from one return to the next."""
-    squared = (beams[a, 0] - beams[b, 0]) ** 2 + (beams[a, 1] - beams[b, 1]) ** 2
-    return squared < gap * gap or beams[a, 5] > 0.0  # false for NaN
-
-
-@_compiled
-def _accumulate(points, moved, jacobians, beams, sensors, gate, gap, normal, rhs):  # type: ignore[no-untyped-def]
-    """Add the robust normal equations of points moved into the frame of some sensors; the sum of weights.
-
-    ``jacobians`` (m, 2, 3) are the derivatives of the moved points by x, y and theta of the pose.
-    """
-    line = np.empty(3)
-    total = 0.0
-    for k in range(len(points)):
-        for s in range(len(sensors)):
-            dx = moved[k, 0] - sensors[s, 2]
-            dy = moved[k, 1] - sensors[s, 3]
-            x = sensors[s, 0] * dx + sensors[s, 1] * dy
-            y = sensors[s, 0] * dy - sensors[s, 1] * dx
-            distance = _surface_line(x, y, _beam_of(x, y, sensors, s), beams, sensors, s, gate, gap, line)
-            if distance >= gate:
-                continue
-            residual = line[0] * x + line[1] * y - line[2]
-            weight = (1.0 - (distance / gate) ** 2) ** 2
-            nx = sensors[s, 0] * line[0] - sensors[s, 1] * line[1]
-            ny = sensors[s, 1] * line[0] + sensors[s, 0] * line[1]
-            total += weight
-            for i in range(3):
-                slope = nx * jacobians[k, 0, i] + ny * jacobians[k, 1, i]
-                rhs[i] -= weight * slope * residual
-                for j in range(3):
-                    normal[i, j] += weight * slope * (nx * jacobians[k, 0, j] + ny * jacobians[k, 1, j])
-            break
-    return total
-
-
-@_compiled
-def normal_equations(
-    sighting_1: Sighting,
-    sighting_2: Sighting,
-    pose: FloatArray,
-    gate: float,
-    gap: float,
-    normal: FloatArray,
-    rhs: FloatArray,
-) -> float:
-    """Points of 2 against the surfaces of 1, and points of 1 against those of 2, at ``T_1_2`` (3,).
-
-    Fills ``normal`` (3, 3) with J^T W J and ``rhs`` (3,) with -J^T W r of the distances r, metres; returns the
-    sum of the weights W.
-    """
-    cosine = math.cos(pose[2])
-    sine = math.sin(pose[2])
-    normal[:] = 0.0
-    rhs[:] = 0.0
-    total = 0.0
-    for way in range(2):
-        points = sighting_2.points if way == 0 else sighting_1.points
-        moved = np.empty((len(points), 2))
-        jacobians = np.empty((len(points), 2, 3))
-        for k in range(len(points)):
-            if way == 0:
-                moved[k, 0] = cosine * points[k, 0] - sine * points[k, 1] + pose[0]
-                moved[k, 1] = sine * points[k, 0] + cosine * points[k, 1] + pose[1]
-                jacobians[k] = np.array(((1.0, 0.0, pose[1] - moved[k, 1]), (0.0, 1.0, moved[k, 0] - pose[0])))
-            else:
-                dx = points[k, 0] - pose[0]
-                dy = points[k, 1] - pose[1]
-                moved[k, 0] = cosine * dx + sine * dy
-                moved[k, 1] = cosine * dy - sine * dx
-                jacobians[k] = np.array(((-cosine, -sine, moved[k, 1]), (sine, -cosine, -moved[k, 0])))
-        seen = sighting_1 if way == 0 else sighting_2
-        total += _accumulate(points, moved, jacobians, seen.beams, seen.sensors, gate, gap, normal, rhs)
-    return total
-
-
-@_compiled
-def refine(
-    sighting_1: Sighting,
-    sighting_2: Sighting,
-    poses: FloatArray,
-    steps: int,
-    first_gate: float,
-    last_gate: float,
-    gap: float,
-) -> FloatArray:
-    """Each ``T_1_2`` of poses (k, 3) after some steps of robust point-to-line least squares with a shrinking gate."""
-    refined = poses.copy()
-    normal = np.empty((3, 3))
-    rhs = np.empty(3)
-    for k in range(len(poses)):
-        for step in range(steps):
-            gate = first_gate * (last_gate / first_gate) ** (step / max(1, steps - 1))
-            total = normal_equations(sighting_1, sighting_2, refined[k], gate, gap, normal, rhs)
-            if total < 3.0:
-                break
-            step_down(normal, rhs, refined[k])
-    return refined

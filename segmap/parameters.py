@@ -113,10 +113,26 @@ class Parameters(BaseModel):
         4.0, "m", "An integration is valid when its value is above this (IV-B, V-B).", ge=0.0, le=100000.0
     )
     ranked_candidates: int = _parameter(
-        50, "", "How many of the best candidates an integration keeps for inspection.", ge=1, le=10000
+        50,
+        "",
+        "How many of the best candidates an integration keeps for inspection; verified: at most 12 distinct ones.",
+        ge=1,
+        le=10000,
     )
 
-    # evidence (beyond the paper: verified mode)
+    # evidence (beyond the paper: verified mode); with all of these off it is paper mode, to the last bit
+    use_sights: bool = _parameter(
+        True, "", "verified: rank candidates by lines of sight; off: by their value, as the paper does."
+    )
+    use_refinement: bool = _parameter(
+        True, "", "verified: refine the best candidates, and say how firmly walls hold them; off: as they are."
+    )
+    use_rivals: bool = _parameter(
+        True, "", "verified: rank distinct poses only, and leave close rivals to a person; off: whatever ranks high."
+    )
+    use_confidence: bool = _parameter(
+        True, "", "verified: accept by the calibrated confidence; off: by the threshold of value alone."
+    )
     sight_tolerance: float = _parameter(
         0.2, "m", "A return supports a candidate when the other map sees a surface within this.", gt=0.0, le=2.0
     )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -16,10 +17,9 @@ from segmap.evaluation import evaluate, matching_values
 from segmap.matches import Candidate
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, Pose2, wrap
-from segmap.refinement import uncertainties
 from segmap.segments import SegmentMap
-from segmap.verification import Verified, Views, verify, views
-from segmap.visibility import evidence, look, score, sighting
+from segmap.verification import Verified, Views, judged, verify, views
+from segmap.visibility import evidence, look, score
 
 __all__ = ["REACH", "Tie", "judged_at", "laid", "settled"]
 
@@ -46,14 +46,11 @@ def judged_at(
     """Any pose as a candidate of place ``index``: its value, and in verified mode its evidence."""
     value = float(matching_values(map_1, map_2, T_1_2, parameters)[1].sum())
     plain = Candidate(T_1_2, value, (0, 0), (0, 0), index)
-    seen_1, seen_2 = (sighting(some, parameters.max_range) for some in (map_1, map_2))
-    if mode != "verified" or seen_1 is None or seen_2 is None:
+    seen = views(map_1, map_2, parameters) if mode == "verified" else None
+    found = None if seen is None else judged(seen, np.array([index]), np.array([tuple(T_1_2)]), parameters)
+    if found is None or not len(found.rows) or not parameters.use_sights:
         return plain
-    poses = np.array([tuple(T_1_2)])
-    totals = look(seen_1, seen_2, poses, parameters)
-    held = uncertainties(map_1, map_2, seen_1, seen_2, poses, parameters)[0]
-    judged = float(score(totals, parameters)[0]), evidence(totals[0]), held
-    return Candidate(T_1_2, value, (0, 0), (0, 0), index, *judged)
+    return replace(plain, score=float(found.merits[0]), evidence=evidence(found.totals[0]), uncertainty=found.held[0])
 
 
 def laid(map_1: SegmentMap, map_2: SegmentMap, ties: Sequence[Tie], parameters: Parameters) -> Pose2:
@@ -119,7 +116,7 @@ def settled(map_1: SegmentMap, map_2: SegmentMap, T_1_2: Pose2, parameters: Para
     seen = views(map_1, map_2, parameters)
     around = _around(T_1_2)
     found = None if seen is None else verify(seen, around, parameters)
-    if mode == "verified" and seen is not None and found is not None:
+    if mode == "verified" and parameters.use_sights and seen is not None and found is not None:
         return _best_seen(T_1_2, seen, found, parameters)
     poses = around if found is None else np.concatenate((around, found.poses))
     return _best_matching(map_1, map_2, T_1_2, poses, parameters)
@@ -143,7 +140,7 @@ def _best_seen(T_1_2: Pose2, seen: Views, found: Verified, parameters: Parameter
     so the pose itself is kept only where it scores clearly more.
     """
     poses = np.concatenate(([tuple(T_1_2)], _nearby(T_1_2, found.poses)))
-    scores = score(look(seen.seen_1, seen.seen_2, poses, parameters), parameters)
+    scores = score(look(*seen.seen, poses, parameters), parameters)
     scores[0] -= CLEARLY * abs(scores[0])
     best = int(np.argmax(scores[::-1]))  # from the end: of equal ones not the pose itself
     return Pose2(*map(float, poses[::-1][best]))

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from segmap import _sight_kernels as kernels
 from segmap._hold_kernels import hold
+from segmap._refine_kernels import refine
+from segmap._sight_kernels import distinct as distinct_rows
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
 from segmap.segments import SegmentMap
 from segmap.visibility import SURFACE_GAP, Sighting, thinned
 
-__all__ = ["Uncertainty", "distinct", "information", "refined", "uncertainties", "uncertainty"]
+__all__ = ["Uncertainty", "distinct", "information", "of_covariance", "refined", "uncertainties", "uncertainty"]
 
 RANGE_NOISE = 0.03
 """metres; standard deviation of a return from the surface that stands for it"""
@@ -48,12 +49,12 @@ def refined(
     A return farther than the gate from every surface near its beam does not count; the gate shrinks from
     ``first_gate`` to ``last_gate`` metres over the steps.
     """
-    return kernels.refine(seen_1, seen_2, np.ascontiguousarray(poses), steps, first_gate, last_gate, SURFACE_GAP)
+    return refine(seen_1, seen_2, np.ascontiguousarray(poses), steps, first_gate, last_gate, SURFACE_GAP)
 
 
 def distinct(poses: FloatArray, order: IntArray, distance: float, angle: float, most: int) -> IntArray:
     """The best of each cluster of poses: rows of ``order``, best first, farther apart than the limits."""
-    return kernels.distinct(poses, np.ascontiguousarray(order), distance, angle, most)
+    return distinct_rows(poses, np.ascontiguousarray(order), distance, angle, most)
 
 
 def uncertainty(
@@ -70,18 +71,18 @@ def uncertainties(
     held = information(map_1, map_2, seen_1, seen_2, poses, parameters) / (CORRELATION * RANGE_NOISE**2)
     weak = 1.0 / parameters.refine_gate**2  # nothing is known better than the gate without any wall
     covariances = np.linalg.inv(held + weak * np.eye(3))
-    variances, directions = np.linalg.eigh(covariances[:, :2, :2])
-    return [
-        Uncertainty(
-            tuple(tuple(row) for row in covariance),  # type: ignore[arg-type]
-            math.sqrt(widest),
-            math.sqrt(narrowest),
-            _half_turn(math.atan2(y, x)),
-        )
-        for covariance, (narrowest, widest), ((_, x), (_, y)) in zip(
-            covariances.tolist(), variances.tolist(), directions.tolist(), strict=True
-        )
-    ]
+    return [of_covariance(covariance) for covariance in covariances]
+
+
+def of_covariance(covariance: FloatArray) -> Uncertainty:
+    """How well a pose of this covariance (3, 3) is known."""
+    variances, directions = np.linalg.eigh(covariance[:2, :2])
+    return Uncertainty(
+        tuple(tuple(row) for row in covariance.tolist()),  # type: ignore[arg-type]
+        math.sqrt(variances[1]),
+        math.sqrt(variances[0]),
+        _half_turn(math.atan2(directions[1, 1], directions[0, 1])),
+    )
 
 
 def _half_turn(heading: float) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from segmap import _sight_kernels as kernels
+from segmap._hold_kernels import look_closely as look_beside_walls
 from segmap._sight_kernels import Sighting
 from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
@@ -28,6 +29,7 @@ __all__ = [
     "classes",
     "evidence",
     "look",
+    "look_closely",
     "score",
     "sensors",
     "sighting",
@@ -47,6 +49,10 @@ GRAZING_RATIO = 2.5
 """the gap beside is at least this part of theirs,"""
 GRAZING_ACROSS = 0.04
 """metres; and the return beyond it is this close to their line"""
+WALLS = 12
+"""longest segments of each map, along which its walls run"""
+WALL_REACH = 0.15
+"""metres; what is nearer to the line of a wall is of the wall"""
 SAME_PLACE = 0.2
 """metres; returns of several scans of a map this close to a surface that others see are of that surface"""
 
@@ -60,11 +66,21 @@ class Evidence:
     shadowed: float
     """close behind a surface that the other map sees"""
     unseen: float
+    off_two: float = 0.0
+    """supported off the two strongest walls: more than a corridor has; known of candidates of verified mode"""
+    off_three: float = 0.0
+    """supported off the three strongest walls: more than most of a plain room has"""
 
     @property
     def agreement(self) -> float:
         """Share of what both maps could judge that is supported, in 0..1; 0 where there is nothing to judge."""
         judged = self.supported + self.contradicted + self.shadowed
+        return self.supported / judged if judged > 0.0 else 0.0
+
+    @property
+    def consistency(self) -> float:
+        """Share of what is supported or seen through that is supported, in 0..1; 0 where there is nothing."""
+        judged = self.supported + self.contradicted
         return self.supported / judged if judged > 0.0 else 0.0
 
     @property
@@ -172,15 +188,32 @@ def look(seen_1: Sighting, seen_2: Sighting, poses: FloatArray, parameters: Para
     return totals
 
 
+def look_closely(
+    maps: tuple[SegmentMap, SegmentMap], seen: tuple[Sighting, Sighting], poses: FloatArray, parameters: Parameters
+) -> FloatArray:
+    """The totals of :func:`look`, and the metres supported off the two and off the three strongest walls, (k, 6).
+
+    One room or corridor is much like another: what tells them apart is what is not on their plain walls.
+    """
+    options = parameters.sight_tolerance, SURFACE_GAP, parameters.shadow_depth, WALL_REACH
+    found: FloatArray = look_beside_walls(*seen, _longest(maps[0]), _longest(maps[1]), poses, *options)
+    return found[:, [*range(kernels.CLASSES), kernels.CLASSES + 1, kernels.CLASSES + 2]]
+
+
+def _longest(segment_map: SegmentMap) -> FloatArray:
+    rows: FloatArray = segment_map.coordinates[np.argsort(-segment_map.lengths, kind="stable")[:WALLS]]
+    return rows
+
+
 def score(totals: FloatArray, parameters: Parameters) -> FloatArray:
-    """What candidates are ranked by, metres: support less what speaks against it; of (k, 4) totals, (k,)."""
+    """What candidates are ranked by, metres: support less what speaks against it; of (k, 4) totals or more, (k,)."""
     weights = (1.0, -parameters.conflict_weight, -parameters.shadow_weight, -parameters.unseen_weight)
-    return totals @ np.array(weights)
+    return totals[:, : kernels.CLASSES] @ np.array(weights)
 
 
 def evidence(totals: FloatArray) -> Evidence:
-    """One row of totals, by name."""
-    return Evidence(*(float(total) for total in totals))
+    """One row of totals, by name; with what is off the walls, if it is there."""
+    return Evidence(*totals.tolist())
 
 
 def classes(seen_1: Sighting, seen_2: Sighting, T_1_2: Pose2, parameters: Parameters) -> tuple[IntArray, IntArray]:

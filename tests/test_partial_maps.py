@@ -5,11 +5,12 @@ import pytest
 import simulated
 
 from segmap.candidates import MOST_LAID, candidates
-from segmap.integration import MOST_ANGLES, Verdict, match_maps
+from segmap.integration import Verdict, match_maps
 from segmap.merging.components import fused
 from segmap.parameters import Parameters, preset
 from segmap.pose import Pose2
 from segmap.segments import Order, SegmentMap, extract
+from segmap.verified_mode import MOST_ANGLES
 
 V = preset("verified")
 PLACES = [Pose2(1.2 + 0.5 * i, 1.6 + 0.3 * (i % 3), 0.5 * i) for i in range(7)]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from simulated import DEGREE, alone, exact, off, perturbed, read_backwards
 
 from segmap._kernels import nearest_segments
-from segmap._sight_kernels import normal_equations
+from segmap._refine_kernels import normal_equations
 from segmap.parameters import Parameters
 from segmap.pose import Pose2
 from segmap.refinement import distinct, information, refined, uncertainty

@@ -212,6 +212,16 @@ def test_threads_change_nothing(in_the_room):
     assert one.ranked == several.ranked
 
 
+def test_thresholds_never_change_what_is_found(in_the_room):
+    """Whatever is accepted, automatic tries the same candidates and ranks the same."""
+    rooms = [extract(noisy(world, T, 7), P) for world, T in _rooms()]
+    for pair in (in_the_room[:2], rooms):
+        found = verified(*pair)
+        for changes in ({"confidence_accept": 1.0}, {"confidence_accept": 0.0, "confidence_review": 0.0}):
+            other = verified(*pair, P.replace(value_threshold=99.0, **changes))
+            assert (other.ranked, other.candidates, other.findings) == (found.ranked, found.candidates, found.findings)
+
+
 def test_the_pose_does_not_depend_on_frames_or_order(in_the_room, matched):
     """Maps moved: the pose moves with them; maps swapped: the pose is inverted."""
     map_1, map_2, truth = in_the_room
@@ -266,17 +276,22 @@ def test_integration_fuses_and_keeps_the_sights(in_the_room):
 # --- hard and poor input --------------------------------------------------------------------------
 
 
-def test_a_map_without_sights_is_judged_by_value(in_the_room):
-    """Candidates, ranking and verdict are paper mode's, on either side; there is no confidence to speak of."""
+def test_a_map_without_sights_is_for_a_person(in_the_room):
+    """On either side: candidates and ranking are paper mode's, the verdict is at most review, and says why."""
     map_1, map_2, _ = in_the_room
     blind_1, blind_2 = (segment_map.take(range(len(segment_map))) for segment_map in (map_1, map_2))
     for one, other in ((blind_1, map_2), (map_1, blind_2), (blind_1, blind_2)):
         match, paper = verified(one, other), match_maps(one, other, P)
         assert match.ranked == paper.ranked
-        assert (match.verdict, match.reasons) == (paper.verdict, paper.reasons)
+        assert paper.verdict is Verdict.ACCEPTED
+        assert match.verdict is Verdict.REVIEW
+        assert any("no lines of sight" in reason for reason in match.reasons)
         assert match.heuristic == AUTOMATIC
+        assert match.confidence is None
         assert match.best.score is match.best.evidence is match.best.uncertainty is None
         assert verified(one, other, heuristic="extremes").best is not None
+        assert Match.from_json(match.to_json()) == match
+        assert match.judged(P.replace(value_threshold=999.0)).verdict is Verdict.REJECTED
 
 
 def test_undirected_maps_are_recovered(in_the_room):

@@ -17,8 +17,11 @@ from app.cli.options import (
     Log,
     Mode,
     Preset,
+    Prior,
+    PriorDeviations,
     Setting,
     method_of,
+    prior_of,
     segment_maps,
 )
 from app.cli.output import pose_json, print_facts, print_json, show_pose
@@ -36,6 +39,8 @@ def integrate(
     heuristic: Heuristic = None,
     preset: Preset = None,
     settings: Setting = None,
+    prior: Prior = None,
+    prior_std: PriorDeviations = None,
     explained: Explain = False,
     as_json: Json = False,
 ) -> None:
@@ -46,7 +51,8 @@ def integrate(
     method = method_of(mode, heuristic, preset, settings)
     name, map_of = segment_maps(log, method.parameters)
     map_1, map_2 = map_of(first), map_of(second)
-    match = match_maps(map_1, map_2, method.parameters, method.heuristic, method.mode)
+    expected = prior_of(prior, prior_std)
+    match = match_maps(map_1, map_2, method.parameters, method.heuristic, method.mode, prior=expected)
     explanation = None
     if explained and match.T_1_2 is not None:
         explanation = explain(map_1, map_2, match.T_1_2, method.parameters, sights=method.mode != "paper")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,8 @@ from segmap.errors import ParameterError
 from segmap.integration import DEFAULT_HEURISTIC, DEFAULT_PRESET, MODES, chosen_heuristic, heuristics
 from segmap.logs import ANY_SIZE, bag_in, holds_maps, read_log, read_logs, read_maps
 from segmap.parameters import PRESETS, Parameters, preset
+from segmap.pose import Pose2
+from segmap.priors import PosePrior
 from segmap.scans import LaserLog
 from segmap.segments import SegmentMap, extract
 
@@ -27,12 +30,15 @@ __all__ = [
     "Mode",
     "Out",
     "Preset",
+    "Prior",
+    "PriorDeviations",
     "Setting",
     "Trajectory",
     "method_of",
     "one_of",
     "open_log",
     "parameters_of",
+    "prior_of",
     "read",
     "read_all",
     "segment_maps",
@@ -93,6 +99,14 @@ Preset: TypeAlias = Annotated[
     str | None,
     typer.Option(metavar=one_of(PRESETS), help=f"The parameters to start from; default: {_by_mode(DEFAULT_PRESET)}."),
 ]
+Prior: TypeAlias = Annotated[
+    str | None,
+    typer.Option(metavar="X,Y,DEGREES", help="Where the second scan is expected in the frame of the first."),
+]
+PriorDeviations: TypeAlias = Annotated[
+    str | None,
+    typer.Option("--prior-std", metavar="X,Y,DEGREES", help="How surely: standard deviations, metres and degrees."),
+]
 Setting: TypeAlias = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Change a parameter; can be given several times."),
@@ -116,6 +130,33 @@ def method_of(mode: str, heuristic: str | None, preset_name: str | None, setting
     """
     chosen = chosen_heuristic(mode, heuristic)
     return Method(parameters_of(preset_name or DEFAULT_PRESET[mode], settings), chosen, mode)
+
+
+def prior_of(mean: str | None, deviations: str | None) -> PosePrior | None:
+    """The prior of ``--prior`` and ``--prior-std``; None without them.
+
+    Raises:
+        ParameterError: one of them is missing, or is not three numbers that make sense.
+    """
+    if mean is None and deviations is None:
+        return None
+    if mean is None or deviations is None:
+        raise ParameterError("--prior and --prior-std go together: where a scan is expected, and how surely.")
+    x, y, degrees = _three("--prior", mean)
+    return PosePrior.with_deviations(Pose2(x, y, math.radians(degrees)), *_deviations(deviations))
+
+
+def _deviations(text: str) -> tuple[float, float, float]:
+    x, y, degrees = _three("--prior-std", text)
+    return x, y, math.radians(degrees)
+
+
+def _three(option: str, text: str) -> tuple[float, float, float]:
+    try:
+        x, y, degrees = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ParameterError(f"{option} {text[:80]} is not three numbers: write {option} X,Y,DEGREES.") from None
+    return x, y, degrees
 
 
 def parameters_of(preset_name: str | None, settings: list[str] | None) -> Parameters:

@@ -263,6 +263,26 @@ def test_integrate_explains_only_when_asked(run: Run, document: Callable[..., An
     assert "worst segments" not in run("integrate", OFFICE, 20, 21)[1]
 
 
+def test_integrate_takes_a_prior(document: Callable[..., Any], run: Run) -> None:
+    """--prior and --prior-std, in metres and degrees: near the truth it is found, elsewhere it is said."""
+    truth = truth_of("office")[20].inverse() @ truth_of("office")[21]
+    near = f"{truth.x + 0.1:.3f},{truth.y:.3f},{np.degrees(truth.theta):.1f}"
+    told = document("integrate", OFFICE, 20, 21, "--prior", near, "--prior-std", "0.3,0.3,8")
+    assert told["verdict"] == "accepted"
+    assert is_right(Pose2(*told["pose"].values()), truth)
+    far = document("integrate", OFFICE, 20, 21, "--prior", "-4,3,90", "--prior-std", "0.3,0.3,8")
+    assert far["verdict"] != "accepted"
+    assert "prior" in " ".join(far["reasons"])
+    for options, expected in (
+        (("--prior", "1,2,3"), "--prior-std"),
+        (("--prior", "1,2", "--prior-std", "1,1,1"), "X,Y,DEGREES"),
+        (("--prior", "1,2,3", "--prior-std", "1,1,0"), "positive"),
+    ):
+        status, out, err = run("integrate", OFFICE, 20, 21, *options)
+        assert (status, out) == (2, "")
+        assert expected in err
+
+
 def test_integrate_finds_where_the_robot_went(document: Callable[..., Any]) -> None:
     """In the laboratory nearly every pose is within 0.25 m and 5 degrees of the truth."""
     poses, right = truth_of("laboratory"), 0

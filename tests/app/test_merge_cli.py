@@ -85,13 +85,13 @@ def test_bridging_can_be_switched_off(merged: Callable[..., Any]) -> None:
 
 def test_closing_is_told(run: Run) -> None:
     """The office is a loop: how far it is from closing, in the document and for people; joined or not, it is tried."""
-    status, out, _ = run("merge", OFFICE, "--stride", 3, "--close", "--json")
+    status, out, _ = run("merge", OFFICE, "--stride", 5, "--close", "--json")
     assert status == 0
     (closure,) = json.loads(out)["closures"]
     assert closure["pair"] == ["0.0", f"0.{COUNT - 1}"]
     assert closure["metres"] < 1.0
     assert closure["flags"] == ["closing"]
-    status, out, _ = run("merge", OFFICE, "--stride", 3, "--close")
+    status, out, _ = run("merge", OFFICE, "--stride", 5, "--close")
     assert status == 0
     assert "from closing" in out
 

@@ -46,7 +46,7 @@ def made(
 
 def verified(scan: int, gap: float, parameters: Parameters = VERIFIED, value: float = 6.0) -> Row:
     """A row of verified mode: the larger the gap to the nearest rival, the surer."""
-    findings = Findings(8.0, gap, Evidence(8.5, 0.2, 0.1, 1.0), 0.02)
+    findings = Findings(8.0, gap, Evidence(8.5, 0.1, 0.1, 1.0, 1.0, 0.5), 0.02)
     outcome = Outcome("automatic", value, (1.0, 2.0, 0.5), confidence=confidence(findings), findings=findings)
     id = f"0.{scan}-0.{scan + 1}"
     return row(Row(id, ScanId(0, scan), ScanId(0, scan + 1), "matching"), "automatic", outcome, None, parameters)

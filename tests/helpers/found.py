@@ -11,7 +11,7 @@ SHARP = Uncertainty(((1e-4, 0.0, 0.0), (0.0, 1e-4, 0.0), (0.0, 0.0, 1e-5)), 0.01
 
 def candidate(T_1_2: Pose2, score: float = 12.0, contradicted: float = 0.2, unseen: float = 8.0) -> Candidate:
     """A candidate with this evidence."""
-    evidence = Evidence(score + 2.0 * contradicted, contradicted, 0.0, unseen)
+    evidence = Evidence(score + 2.0 * contradicted, contradicted, 0.0, unseen, off_two=2.0, off_three=1.0)
     return Candidate(T_1_2, score, (0, 1), (0, 1), 0, score=score, evidence=evidence, uncertainty=SHARP)
 
 
