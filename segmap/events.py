@@ -162,10 +162,13 @@ class Grounds(_Model):
     score: float | None = None
     """support less conflict, metres"""
     supported: float | None = None
-    """metres of wall, as lines of sight have it; so are the next three"""
+    """metres of wall, as lines of sight have it; so are the next five"""
     contradicted: float | None = None
     shadowed: float | None = None
     unseen: float | None = None
+    off_two: float | None = None
+    """supported off the two strongest walls"""
+    off_three: float | None = None
     candidates: int | None = None
     """poses that were tried"""
 
