@@ -30,6 +30,7 @@ __all__ = [
     "ReturnTerm",
     "SegmentTerm",
     "explain",
+    "measured",
 ]
 
 
@@ -179,11 +180,11 @@ def _paired(
     labels = components(rows[matches], len(map_1), len(map_2))
     order = {int(label): place for place, label in enumerate(dict.fromkeys(labels))}
     places[matches] = [order[int(label)] for label in labels]
-    measured = _measured(map_1.coordinates[rows[:, 0]], map_2.moved(T_1_2).coordinates[rows[:, 1]], parameters)
+    columns = measured(map_1.coordinates[rows[:, 0]], map_2.moved(T_1_2).coordinates[rows[:, 1]], parameters)
     pairs = tuple(
         PairTerm(i, j, value, distance, factor, common_1, common_2, None if place < 0 else place)
         for (i, j), value, (distance, factor, common_1, common_2), place in zip(
-            rows.tolist(), values.tolist(), measured.tolist(), places.tolist(), strict=True
+            rows.tolist(), values.tolist(), columns.tolist(), places.tolist(), strict=True
         )
     )
     return pairs, tuple(_chain(pairs, place) for place in range(len(order)))
@@ -195,8 +196,11 @@ def _chain(pairs: Sequence[PairTerm], place: int) -> ChainTerm:
     return ChainTerm(tuple(sorted(first)), tuple(sorted(second)), sum(pair.value for pair in held))
 
 
-def _measured(one: FloatArray, other: FloatArray, parameters: Parameters) -> FloatArray:
-    """Distance, factor and common lengths of pairs of segments (m, 4) each, in one frame: (m, 4)."""
+def measured(one: FloatArray, other: FloatArray, parameters: Parameters) -> FloatArray:
+    """What the matching value is made of (Algorithm 4, lines 9 to 17), for pairs of segments (m, 4) each, in one frame.
+
+    Returns (m, 4): distance in metres, the factor of the penalty, and the common lengths l1 and l2 in metres.
+    """
     to_one, along_one, length_one = _against(one, other)
     to_other, along_other, length_other = _against(other, one)
     distance = np.minimum(np.abs(to_one).max(axis=1), np.abs(to_other).max(axis=1))

@@ -65,6 +65,7 @@ ORDER = (
     "relations",
     "benchmark",
     "pair_pictures",
+    "walkthrough",
     "datasets",
 )
 """The data flow: a module imports only from those before it, or from its own package."""

@@ -5,6 +5,15 @@ each wall comes out once, however many scans saw it.
 """
 
 from segmap.fusion.chains import Fusion, Polyline, closest_edges, fuse, polyline
-from segmap.fusion.whole import fuse_all, spurious_length
+from segmap.fusion.whole import fuse_all, spurious_length, spurious_stretches
 
-__all__ = ["Fusion", "Polyline", "closest_edges", "fuse", "fuse_all", "polyline", "spurious_length"]
+__all__ = [
+    "Fusion",
+    "Polyline",
+    "closest_edges",
+    "fuse",
+    "fuse_all",
+    "polyline",
+    "spurious_length",
+    "spurious_stretches",
+]

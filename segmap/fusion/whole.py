@@ -17,7 +17,7 @@ from segmap.pose import FloatArray, Pose2
 from segmap.scans import ScanId
 from segmap.segments import LEAST_LENGTH, Order, SegmentMap, Source
 
-__all__ = ["fuse_all", "spurious_length"]
+__all__ = ["fuse_all", "spurious_length", "spurious_stretches"]
 
 DOUBLE_DISTANCE, DOUBLE_ANGLE = 0.05, np.radians(5.0)
 """metres and radians; of two segments nearer than this, one is spurious"""
@@ -89,13 +89,31 @@ def spurious_length(segment_map: SegmentMap) -> float:
     >>> spurious_length(SegmentMap(np.array([[0.0, 0.0, 2.0, 0.0], [1.0, 0.01, 3.0, 0.01], [2.0, 0.0, 0.0, 0.0]])))
     2.0
     """
+    return _united(*_doubled(segment_map))
+
+
+def spurious_stretches(segment_map: SegmentMap) -> FloatArray:
+    """The stretches of segments that :func:`spurious_length` counts, rows x1, y1, x2, y2; some may overlap.
+
+    >>> len(spurious_stretches(SegmentMap(np.array([[0.0, 0.0, 2.0, 0.0], [5.0, 0.0, 7.0, 0.0]]))))
+    0
+    """
+    owners, first, last = _doubled(segment_map)
+    starts = segment_map.coordinates[owners, :2]
+    ways = (segment_map.coordinates[owners, 2:] - starts) / segment_map.lengths[owners, None]
+    rows = np.column_stack((starts + first[:, None] * ways, starts + last[:, None] * ways))
+    return rows[last - first > LEAST_LENGTH]
+
+
+def _doubled(segment_map: SegmentMap) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Segments with another one beside them, (k,), and from where to where along each, metres."""
     edges, lengths = segment_map.coordinates, segment_map.lengths
     i, j = _neighbours(segment_map)
     ways = (edges[:, 2:] - edges[:, :2]) / lengths[:, None]
     starts, ends = (_in_frame(edges[j, k : k + 2] - edges[i, :2], ways[i]) for k in (0, 2))
     first, last = _beside(starts, ends)
     first, last = np.clip(np.sort((first, last), axis=0), 0.0, lengths[i])
-    return _united(i, first, last)
+    return i, first, last
 
 
 def _neighbours(segment_map: SegmentMap) -> tuple[FloatArray, FloatArray]:

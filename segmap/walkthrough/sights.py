@@ -1,0 +1,212 @@
+"""Lines of sight under one candidate, and how verified mode refines and ranks (beyond the paper)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from segmap.explanation import Explanation, MapSight, explain
+from segmap.matches import Match
+from segmap.parameters import Parameters
+from segmap.pose import FloatArray, Pose2
+from segmap.segments import SegmentMap
+from segmap.tracing import Event, Trace
+from segmap.visibility import CLASS_NAMES
+from segmap.walkthrough.steps import Box, Mark, Quantity, Shape, Stage, Step, degrees, lines, metres, of, points
+
+__all__ = ["refinement_stage", "sight_stage"]
+
+MEANING = {
+    "supported": "the other sensor saw a surface just there",
+    "contradicted": "the other sensor saw through the place: nothing can stand there",
+    "shadowed": "it lies close behind a surface the other sensor saw",
+    "unseen": "the other sensor could not see the place",
+}
+
+
+def sight_stage(
+    maps: tuple[SegmentMap, SegmentMap], T_1_2: Pose2, parameters: Parameters, box: Box | None, known_as: str
+) -> list[Stage]:
+    """What the beams of each scan say of the points of the other; none where a map knows of no scan."""
+    told = explain(*maps, T_1_2, parameters)
+    if told.sights is None:
+        return []
+    held = _Sight(maps, T_1_2, told, known_as)
+    marks = (Mark(0, "both scans"), *(Mark(1 + k, MEANING[name]) for k, name in enumerate(CLASS_NAMES)))
+    stage = Stage(
+        id="sight",
+        title="Lines of sight",
+        about="A scan is more than its walls: along each beam, the way to the first thing it met is empty. A candidate"
+        " that puts a wall of one scan into the empty space of the other is wrong, however well the segments match.",
+        algorithm="verified",
+        count=1 + len(CLASS_NAMES) + len(held.by_segment),
+        step=held.step,
+        marks=marks,
+        box=box,
+    )
+    return [stage]
+
+
+@dataclass(frozen=True)
+class _Part:
+    which: int
+    segment: int | None
+
+
+class _Sight:
+    def __init__(self, maps: tuple[SegmentMap, SegmentMap], T_1_2: Pose2, told: Explanation, known_as: str) -> None:
+        assert told.sights is not None
+        self.maps, self.T_1_2, self.told, self.known_as = maps, T_1_2, told, known_as
+        self.sides: tuple[MapSight, MapSight] = told.sights
+        self.by_segment = [_Part(which, term.segment) for which in (1, 0) for term in self.sides[which].segments]
+        self._sensors = [np.array([(s.T_map_sensor.x, s.T_map_sensor.y) for s in each.sights]) for each in maps]
+
+    def step(self, k: int) -> Step:
+        """Both scans, one kind of evidence, or the points on one segment."""
+        if k == 0:
+            return self._all()
+        return self._kind(k - 1) if k <= len(CLASS_NAMES) else self._segment(self.by_segment[k - 1 - len(CLASS_NAMES)])
+
+    def _places(self, which: int, seen: str | None = None, segment: object = ...) -> FloatArray:
+        """Points of one map in frame 1."""
+        chosen = [
+            (r.x, r.y)
+            for r in self.sides[which].returns
+            if (seen is None or r.seen == seen) and (segment is ... or r.segment == segment)
+        ]
+        return (self.T_1_2 if which else Pose2.identity()) @ np.reshape(chosen, (-1, 2))
+
+    def _walls(self) -> list[Shape]:
+        return [of("first", "faint"), of("second", "faint", pose=self.T_1_2)]
+
+    def _all(self) -> Step:
+        shapes = self._walls()
+        shapes += [points(self._places(which, name), name, size=4) for which in (0, 1) for name in CLASS_NAMES]
+        say = (
+            f"{self.known_as}: every dot is a point that one sensor saw, coloured by what the other sensor says of the"
+            " place. Green is support, red contradiction; grey could not be judged."
+        )
+        score = () if self.told.score is None else (metres("score", self.told.score),)
+        return Step("1", say, tuple(shapes), (*self._terms(), *score))
+
+    def _terms(self) -> tuple[Quantity, ...]:
+        held = self.told.evidence
+        return () if held is None else tuple(metres(name, float(getattr(held, name)), 2) for name in CLASS_NAMES)
+
+    def _kind(self, kind: int) -> Step:
+        name = CLASS_NAMES[kind]
+        count = sum(len(self._places(which, name)) for which in (0, 1))
+        shapes = self._walls()
+        for which in (0, 1):
+            shapes += [points(self._places(which, name), name, size=5)]
+            shapes += self._beams(which, self._places(which, name)[::6])
+        term = (self.told.terms or {}).get(name, 0.0)
+        does = f"adds {term:.2f} m to" if term >= 0.0 else f"takes {-term:.2f} m from"
+        say = (
+            f"{name.capitalize()}, {count} points: {MEANING[name]}. This {does} the score. The thin lines are beams of"
+            " the other sensor."
+        )
+        line = ("2", "3", "4", "4")[kind]
+        return Step(line, say, tuple(shapes), (*self._terms(), metres("part of the score", term)))
+
+    def _beams(self, which: int, places: FloatArray) -> list[Shape]:
+        """From the nearest sensor of the other map to some points."""
+        sensors = self._sensors[1 - which]
+        if not len(sensors) or not len(places):
+            return []
+        sensors = sensors if which else self.T_1_2 @ sensors
+        nearest = sensors[np.argmin(np.hypot(*(places[:, None] - sensors).transpose(2, 0, 1)), axis=1)]
+        return [lines(np.concatenate((nearest, places), axis=1), "beam", width=0.8)]
+
+    def _segment(self, part: _Part) -> Step:
+        term = next(t for t in self.sides[part.which].segments if t.segment == part.segment)
+        shapes = self._walls()
+        if part.segment is not None:
+            name, pose = (("first", None), ("second", self.T_1_2))[part.which]
+            shapes.append(of(name, "accent", [part.segment], pose, width=3))
+        for name in CLASS_NAMES:
+            places = self._places(part.which, name, part.segment)
+            shapes += [*self._beams(part.which, places[::2]), points(places, name, size=5)]
+        where = "that lie on no segment" if part.segment is None else f"on segment {part.segment}"
+        say = (
+            f"The points {where} of map {part.which + 1}, as the sensor of map {2 - part.which} sees them:"
+            f" together they {'add' if term.score >= 0 else 'take'} {abs(term.score):.2f} m."
+        )
+        told = tuple(metres(name, float(getattr(term.evidence, name)), 2) for name in CLASS_NAMES)
+        return Step("5", say, tuple(shapes), (*told, metres("part of the score", term.score)))
+
+
+# --- refinement (verified mode) ---------------------------------------------------------------------
+
+
+def refinement_stage(trace: Trace, match: Match, parameters: Parameters, box: Box | None) -> list[Stage]:
+    """From all candidates to few refined ones, ranked; none in paper mode."""
+    events = trace.all("refined")
+    if not events or not match.ranked:
+        return []
+    held = _Refinement(events, match, parameters)
+    stage = Stage(
+        id="refinement",
+        title="Refining and ranking",
+        about="Equal angles lay map 2 only about right. Verified mode scores the candidates by lines of sight, keeps"
+        " the best of each heap of similar ones, moves each until the points fit, and scores again.",
+        algorithm="verified",
+        count=2 * len(events) + len(match.ranked),
+        step=held.step,
+        marks=(Mark(0, "all candidates"), Mark(2 * len(events), "the winner")),
+        box=box,
+    )
+    return [stage]
+
+
+class _Refinement:
+    def __init__(self, events: list[Event], match: Match, parameters: Parameters) -> None:
+        self.events, self.match, self.parameters = events, match, parameters
+
+    def step(self, k: int) -> Step:
+        """Of each try: what is left of all candidates, and where refinement moves it; then the ranked ones."""
+        if k < 2 * len(self.events):
+            event = self.events[k // 2]
+            return self._moved(event) if k % 2 else self._promising(event)
+        return self._ranked(k - 2 * len(self.events))
+
+    def _promising(self, event: Event) -> Step:
+        poses, rows = event["poses"], event["rows"]
+        say = (
+            f"Each dot is where a candidate puts the sensor of scan 2. Of {len(poses)} candidates {len(rows)} are left"
+            " (marked): the best by lines of sight, one of each heap."
+        )
+        thinned = poses[:: max(1, len(poses) // 2000), :2]
+        shapes = (of("first", "first"), points(thinned, "faint", size=3), points(poses[rows, :2], "accent", size=6))
+        return Step("1", say, shapes, (("candidates", str(len(poses)), ""), ("kept", str(len(rows)), "")))
+
+    def _moved(self, event: Event) -> Step:
+        before, after = event["poses"][event["rows"]], event["moved"]
+        far = np.hypot(*(after - before)[:, :2].T)
+        say = (
+            "Refinement moves each of them until the points of either scan lie on the surfaces of the other as well as"
+            " they can. Short strokes: it was nearly right. Several end in one place: they were the same guess."
+        )
+        strokes = lines(np.concatenate((before[:, :2], after[:, :2]), axis=1), "accent", width=1.5)
+        shapes = (of("first", "first"), strokes, points(after[:, :2], "new", size=5))
+        return Step("6", say, shapes, (metres("moved, median", float(np.median(far))), ("poses", str(len(after)), "")))
+
+    def _ranked(self, rank: int) -> Step:
+        one = self.match.ranked[rank]
+        shapes = (of("first", "first", width=2.5), of("second", "second", pose=one.T_1_2, width=2.5))
+        told: list[Quantity] = [metres("value", one.value)]
+        if one.score is not None:
+            told.append(metres("score", one.score))
+        if one.evidence is not None:
+            told += [metres(name, float(getattr(one.evidence, name)), 2) for name in CLASS_NAMES]
+        if one.uncertainty is not None:
+            told.append(metres("uncertain by, along the weakest direction", one.uncertainty.weakest))
+        told.append(degrees("turn", one.T_1_2.theta))
+        say = (
+            "The winner: the refined candidate of the highest score."
+            if rank == 0
+            else f"Rival {rank}: another place where map 2 could lie. The closer its score comes to the winner's, the"
+            " less sure the winner is."
+        )
+        return Step("7", say, shapes, tuple(told))
