@@ -1,4 +1,4 @@
-"""Bytes to read: a path, bytes or a stream; gzip taken off; size, ratio and line length bounded.
+"""Bytes to read: a path, bytes or a stream; gzip taken off; size, ratio, time and line length bounded.
 
 A compressed file that is cut off or damaged ends early: what came before the damage is still
 read. One that grows beyond all measure is refused.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import math
 import os
+import time
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -47,9 +48,11 @@ class Limits:
     """bytes of one line"""
     lines: int = 10_000_000
     scans: int = 500_000
+    seconds: float = 600.0
+    """of reading; 256 MiB take less than a minute"""
 
 
-ANY_SIZE = Limits(size=1 << 50, lines=1 << 40)
+ANY_SIZE = Limits(size=1 << 50, lines=1 << 40, seconds=math.inf)
 """for files of one's own; what grows beyond measure when decompressed is refused all the same"""
 
 
@@ -211,6 +214,7 @@ class _Bounded(io.RawIOBase):
         self._inflated = _Inflated(self._compressed, start) if start == GZIP else None
         self._start = b"" if self._inflated else start
         self._size = self._expanded = 0
+        self._end = time.monotonic() + limits.seconds
 
     @property
     def compressed(self) -> bool:
@@ -253,6 +257,8 @@ class _Bounded(io.RawIOBase):
 
     def _check(self, more: int) -> None:
         self._size += more
+        if time.monotonic() > self._end:
+            raise LogError(f"{self._name} takes more than {self._limits.seconds:g} s to read: split it and read each.")
         if self._size > self._limits.size:
             size = _mebibytes(self._limits.size)
             raise LogError(f"{self._name} holds more than {size}: split it into several logs and read each.")

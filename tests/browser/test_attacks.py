@@ -5,7 +5,7 @@ from __future__ import annotations
 import http.server
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from typing import Any
 
 import httpx
@@ -65,17 +65,18 @@ def foreign_page() -> Iterator[str]:
         serving.shutdown()
 
 
-def test_a_foreign_page_reads_and_changes_nothing(desk: Any, server: Any) -> None:
+def test_a_foreign_page_reads_and_changes_nothing(make_desk: Any, server: Any) -> None:
     """Neither by fetch nor by form, stream, socket, picture, script or frame; and what was decided is as it was."""
     project = server.open_sample("hall")
     before = server.get(f"/api{project}")["revision"]
     view = httpx.post(f"{server.url}/api{project}/views", timeout=60.0).json()
     socket = server.url.replace("http", "ws") + view["scene"].rstrip("/")
     target = {"url": server.url, "api": f"{server.url}/api{project}", "socket": socket}
-    with foreign_page() as url:
-        desk.page.goto(url)
-        tried = desk.page.evaluate(ATTACK, target)
-        framed = desk.page.evaluate(
+    with foreign_page() as url, closing(make_desk().page.context) as window:
+        (page,) = window.pages
+        page.goto(url)
+        tried = page.evaluate(ATTACK, target)
+        framed = page.evaluate(
             """(url) => new Promise((done) => {
               const frame = document.createElement("iframe");
               frame.onload = () => { try { done(String(frame.contentDocument?.title)); } catch { done("refused"); } };
@@ -88,7 +89,6 @@ def test_a_foreign_page_reads_and_changes_nothing(desk: Any, server: Any) -> Non
     assert set(tried.values()) == {"refused"}, tried
     assert framed in ("refused", "null", "undefined", "")
     assert server.get(f"/api{project}")["revision"] == before
-    desk.errors.clear()
 
 
 def test_hostile_words_are_words(desk: Any, server: Any) -> None:

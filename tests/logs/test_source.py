@@ -123,6 +123,12 @@ def test_size_limit_of_a_plain_file(small_log):
         read_log(small_log, limits=Limits(size=100))
 
 
+def test_time_limit(small_log):
+    """A file that takes for ever is given up, and told of."""
+    with pytest.raises(LogError, match=r"a\.log takes more than 0 s to read: split it"):
+        read_log(small_log, "a.log", Limits(seconds=0.0))
+
+
 def test_long_lines(small_log):
     """A line that is too long is passed over and told of; the others are read."""
     first, rest = small_log.split(b"\n", 1)
