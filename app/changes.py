@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from segmap.events import IntegrationId
 from segmap.project import ProjectState
 
-__all__ = ["Change", "changed", "is_accepted", "settings_of", "told"]
+__all__ = ["Change", "changed", "events_of", "is_accepted", "settings_of", "told"]
+
+ROWS_TOLD = 200
+"""rows sent along with an event; a page loads the queue again when more changed"""
 
 
 @dataclass(frozen=True)
@@ -45,3 +48,21 @@ def settings_of(state: ProjectState) -> tuple[object, ...]:
 def told(state: ProjectState) -> Mapping[str, Any]:
     """What every event about a step says."""
     return {"revision": state.revision, "undo": state.can_undo, "redo": state.can_redo}
+
+
+def events_of(before: ProjectState, change: Change, row_of: Callable[[str], Mapping[str, Any] | None]) -> list[Any]:
+    """What to tell everybody about a step; ``row_of`` gives the row of an integration, where it still has one."""
+    state = change.state
+    common, events = told(state), []
+    if before.name != state.name:
+        events.append({"type": "project", **common, "name": state.name})
+    if change.integrations:
+        rows = [row for name in change.integrations[:ROWS_TOLD] if (row := row_of(name)) is not None]
+        events.append({"type": "decision", **common, "integrations": change.integrations, "rows": rows})
+    if settings_of(before) != settings_of(state):
+        parameters = state.parameters.model_dump(mode="json")
+        method = {"heuristic": state.heuristic, "mode": state.mode}
+        events.append({"type": "parameters", **common, "parameters": parameters, **method})
+    if before.logs != state.logs:
+        events.append({"type": "log", **common, "logs": [log.name for log in state.logs[len(before.logs) :]]})
+    return events

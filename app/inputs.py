@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 from app.errors import UnknownError
 from app.matching import ResultStore
+from segmap.errors import SegmapError
 from segmap.logs import Limits, read_log
 from segmap.parameters import Parameters
 from segmap.project import LogInfo
@@ -40,7 +42,8 @@ def facts_of(log: LaserLog) -> Facts:
 
 def remember(results: ResultStore, info: LogInfo, facts: Facts) -> None:
     """Keep the facts of a log in its project, so that showing them takes no reading."""
-    results.put_result(_key(info), json.dumps([facts.no_return, facts.problems]))
+    with suppress(SegmapError):  # on a full disk they are found again when asked for
+        results.put_result(_key(info), json.dumps([facts.no_return, facts.problems]))
 
 
 def _key(info: LogInfo) -> str:

@@ -22,6 +22,9 @@ class Listeners:
         self._lock = threading.Lock()
         self._listeners: tuple[Listener, ...] = ()
 
+    def __len__(self) -> int:
+        return len(self._listeners)
+
     def add(self, listener: Listener) -> Callable[[], None]:
         """Call ``listener`` with every event, until what is given back is called."""
         own = _Own(listener)

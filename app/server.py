@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import logging
 import socket
 import sys
 import threading
@@ -34,10 +35,11 @@ from app.workspace import Workspace
 
 __all__ = ["create_app", "reached_at", "serve"]
 
+log = logging.getLogger(__name__)
 HOST = "127.0.0.1"
 PORT = 8000
 NEXT_PORTS = 20
-REAP_SECONDS = 10.0
+TEND_SECONDS = 2.0
 GRACE_SECONDS = 3
 SOCKET_BYTES = 64 * 1024 * 1024
 ROUTERS = (
@@ -92,19 +94,22 @@ def create_app(
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     services: Services = app.state.services
     services.start()
-    reaper = asyncio.create_task(_reap(services.views))
+    tending = asyncio.create_task(_tend(services))
     try:
         yield
     finally:
-        reaper.cancel()
+        tending.cancel()
         services.streams.close()
         await run_in_threadpool(services.close)
 
 
-async def _reap(open_views: Views) -> None:
+async def _tend(services: Services) -> None:
     while True:
-        await asyncio.sleep(REAP_SECONDS)
-        await run_in_threadpool(open_views.reap)
+        await asyncio.sleep(TEND_SECONDS)
+        try:
+            await run_in_threadpool(services.tend)
+        except Exception:
+            log.exception("Open projects could not be looked after.")
 
 
 # --- serving --------------------------------------------------------------------------------------

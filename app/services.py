@@ -33,6 +33,11 @@ class Services:
             self.views.close_of(session)
         self.workspace.delete(project)
 
+    def tend(self) -> None:
+        """What is to be done every few seconds: let go what nobody uses, hear what other programs wrote."""
+        self.views.reap()
+        self.workspace.tend()
+
     def close(self) -> None:
         """Close scenes, sessions and processes."""
         if self.warm_up is not None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from typing import Any
 
-from app.changes import Change, changed, is_accepted, settings_of, told
+from app.changes import Change, changed, events_of, is_accepted, settings_of
 from app.claims import with_claim
 from app.creation import Filled, Source, put_in, read_sources
 from app.criterion import CRITERIA, Criterion
@@ -38,8 +39,6 @@ __all__ = ["PICTURE", "Change", "Session"]
 Finder = Callable[..., Match]
 PICTURE = "picture"
 """key of the merged map's picture among the results in the project file; empty: there is no map"""
-ROWS_TOLD = 200
-"""rows sent along with an event; a page loads the queue again when more changed"""
 
 
 class Session(Steps):
@@ -149,9 +148,8 @@ class Session(Steps):
             before = self._state
             filled = put_in(self._store, read, who)
             self._inputs.add(self._store.state.logs, filled.logs)
-            self._take_over(before)
-        self._tell({"type": "log", **told(self._state), "logs": [log.name for log in filled.logs.values()]})
-        self._progressed()
+            change = self._take_over(before)
+        self._tell_change(before, change)
         return filled
 
     # --- matches ----------------------------------------------------------------------------------
@@ -264,6 +262,11 @@ class Session(Steps):
         parts = (self.loops, self._matching, self._map)
         return all(part.settle(timeout) for part in parts)
 
+    @property
+    def idle(self) -> bool:
+        """Whether nobody listens, and nothing is under way or was stopped halfway."""
+        return not self._listeners and not self._matching.progress.cancelled and self.settle(0.0)
+
     def leave(self) -> None:
         """Tell everybody that the project was deleted and is about to be closed."""
         self._tell({"type": "deleted"})
@@ -303,9 +306,24 @@ class Session(Steps):
         self._tell_change(before, change)
         return change
 
+    def catch_up(self) -> None:
+        """Take over what another program has written into the project, and tell everybody.
+
+        Raises:
+            ProjectError: the file cannot be read.
+        """
+        with self._lock:
+            before = self._state
+            if self._store.refresh().revision == before.revision:
+                return
+            change = self._take_over(before)
+        self._tell_change(before, change)
+
     def _take_over(self, before: ProjectState) -> Change:
         """Let the state on the disk be the one in force."""
         self._state = self._store.state
+        if self._state.logs != before.logs:
+            self._inputs.add(self._state.logs, {})
         change = Change(self._state, changed(before, self._state))
         self._version += 1
         self._follow(change, before)
@@ -324,19 +342,13 @@ class Session(Steps):
             self._map.ask()
 
     def _tell_change(self, before: ProjectState, change: Change) -> None:
-        state = change.state
-        if before.name != state.name:
-            self._tell({"type": "project", **told(state), "name": state.name})
-        if change.integrations:
-            rows = [self.row(name).to_json() for name in change.integrations if name in self._rows]
-            self._tell(
-                {"type": "decision", **told(state), "integrations": change.integrations, "rows": rows[:ROWS_TOLD]}
-            )
-        if settings_of(before) != settings_of(state):
-            parameters = state.parameters.model_dump(mode="json")
-            method = {"heuristic": state.heuristic, "mode": state.mode}
-            self._tell({"type": "parameters", **told(state), "parameters": parameters, **method})
+        for event in events_of(before, change, self._row_told):
+            self._tell(event)
+        if settings_of(before) != settings_of(change.state) or before.logs != change.state.logs:
             self._progressed()
+
+    def _row_told(self, integration: str) -> Mapping[str, Any] | None:
+        return self.row(integration).to_json() if integration in self._rows else None
 
     def _match(self, integration: str, heuristic: str, settings: Settings, check: Check) -> Match:
         first, second = IntegrationId.parse(integration)

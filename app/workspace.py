@@ -6,6 +6,7 @@ import hashlib
 import re
 import secrets
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -30,6 +31,8 @@ from segmap.store import Store
 __all__ = ["Created", "Summary", "Workspace", "default_folder"]
 
 SUFFIX = ".segmap"
+IDLE_SECONDS = 300.0
+"""after which a project that nobody looks at is closed; it is opened again when somebody does"""
 ID = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
 
 
@@ -75,6 +78,7 @@ class Workspace:
         self._warm_up, self._new_session = warm_up, open_session
         self._lock = threading.RLock()
         self._sessions: dict[str, Session] = {}
+        self._used: dict[str, float] = {}
         self._elsewhere: dict[str, Path] = {}
         self._closed: dict[str, Path] = {}
         self._trash = Trash(self._folder, SUFFIX)
@@ -129,6 +133,7 @@ class Workspace:
             UnknownError: there is no such project.
             ProjectError: its file cannot be read.
         """
+        self._used[id] = time.monotonic()
         session = self._sessions.get(id)
         if session is not None:
             return session
@@ -146,6 +151,16 @@ class Workspace:
     def open_session(self, id: str) -> Session | None:
         """The session of a project where it is open."""
         return self._sessions.get(id)
+
+    def tend(self, idle_seconds: float = IDLE_SECONDS) -> None:
+        """Take over what other programs wrote into open projects; close those nobody has looked at for a while."""
+        for id, session in list(self._sessions.items()):
+            with suppress(SegmapError):
+                session.catch_up()
+            if time.monotonic() - self._used[id] > idle_seconds and session.idle:
+                with self._lock:
+                    self._sessions.pop(id, None)
+                session.close()
 
     def backup(self, id: str, target: Path) -> ProjectState:
         """Write a project into one new file, as it is now; work on it goes on. Returns the state written."""

@@ -58,6 +58,7 @@ class Store:
         self.path = path
         self._connection = connection
         self._lock = threading.RLock()
+        self._file = _found(path)
         self._results_size: int | None = None
         try:
             self._state = self._replayed(ProjectState())
@@ -148,11 +149,31 @@ class Store:
     def _recording(self) -> Iterator[ProjectState]:
         """The state with all that is on the disk, and a transaction in which to add to it."""
         with self._lock:
+            self._check_place()
             with self._writing():
                 before = self._replayed(self._state)
                 yield before
                 after = replay(self.events(after=before.revision), before)
             self._state = after  # only now is it on the disk
+
+    def _check_place(self) -> None:
+        """What goes into a file that was moved, replaced or cut off under the open store would be lost.
+
+        Raises:
+            ProjectError: it was.
+        """
+        now = _found(self.path)
+        if now is None or self._file is None or now[:2] != self._file[:2]:
+            happened = "moved, replaced or deleted"
+        elif now[2] < self._file[2]:
+            happened = "cut off"
+        else:
+            self._file = now
+            return
+        raise ProjectError(
+            f"{self.path} was {happened} while it was open: nothing of this was kept."
+            " Put it back, or open it again where it is now, or a backup of it."
+        )
 
     def _replayed(self, state: ProjectState) -> ProjectState:
         events = self.events(after=state.revision)
@@ -308,6 +329,15 @@ class Store:
 
 _DROP_OLDEST = """DELETE FROM results WHERE number <= (SELECT coalesce(max(number), 0) FROM
     (SELECT number, sum(length(value)) OVER (ORDER BY number DESC) AS total FROM results) WHERE total > ?)"""
+
+
+def _found(path: Path) -> tuple[int, int, int] | None:
+    """Which file lies there, by what the system calls it, and its bytes, which never become fewer; None: none."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino, status.st_size
 
 
 def _pieces(name: str, file: BinaryIO) -> Iterator[bytes]:
