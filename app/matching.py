@@ -21,7 +21,7 @@ from segmap.integration import DEFAULT_PRESET, Match, heuristics
 from segmap.parameters import Parameters, preset
 from segmap.verdict import CALIBRATION
 
-__all__ = ["Matching", "Progress", "Settings", "Task"]
+__all__ = ["Matching", "Progress", "Settings", "Task", "recall"]
 
 MATCHES_IN_MEMORY = 256
 PREPARING = "Getting ready; the first time this takes some seconds."
@@ -284,6 +284,16 @@ class Matching:
     @staticmethod
     def _outcome_key(task: Task) -> str:
         return f"outcome-2/{task.key}/{task.integration}"
+
+
+def recall(store: ResultStore, settings: Settings) -> Callable[[str, str], Outcome | None]:
+    """What a project file holds of matches under these settings, by integration and heuristic; nothing is computed."""
+
+    def outcome(integration: str, heuristic: str) -> Outcome | None:
+        task = Task(integration, heuristic, settings.key(heuristic))
+        return _outcome(store.get_result(Matching._outcome_key(task)))
+
+    return outcome
 
 
 def _outcome(text: str | None) -> Outcome | None:

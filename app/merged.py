@@ -10,7 +10,7 @@ from app.posegraph import Solver, edges_of, placed
 from app.resources import program_version
 from app.review import THRESHOLDS
 from segmap.errors import CancelledError, ExportError, ProjectError, SegmapError
-from segmap.export import RESOLUTION, Content
+from segmap.export import RESOLUTION, Content, Record
 from segmap.merging import Component, map_hash, merge_accepted
 from segmap.parameters import Parameters
 from segmap.project import ProjectState
@@ -71,16 +71,17 @@ def exportable(
     time_of: Callable[[ScanId], float | None],
     stem: str = "map",
     resolution: float = RESOLUTION,
+    record: Record | None = None,
 ) -> Content:
     """The merged map of a project, ready to be written in any format; it says where it comes from.
 
     ``stem`` is what the names of files begin with, ``resolution`` the side of a cell in metres where
-    a format has cells.
+    a format has cells, ``record`` what a report tells besides.
 
     Raises:
-        ExportError: nothing is accepted.
+        ExportError: nothing is accepted, and there is no record to tell of either.
     """
-    if not merged.components:
+    if not merged.components and record is None:
         raise ExportError("There is nothing to export: accept at least one integration first.")
     told = {
         "title": state.name,
@@ -90,7 +91,7 @@ def exportable(
         "parameters": state.fingerprint,
     }
     times = {scan: time_of(scan) for component in merged.components for scan in component.scans}
-    return Content(merged.components, told, merged.integrations, times, stem, resolution)
+    return Content(merged.components, told, merged.integrations, times, stem, resolution, record=record)
 
 
 class MergedMap:

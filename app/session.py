@@ -20,13 +20,14 @@ from app.loops import Loops
 from app.matching import Matching, Progress, Settings
 from app.merged import Extractor, Merged, MergedMap, map_parameters
 from app.pairs import integrations_of
-from app.posegraph import Solver
+from app.posegraph import Solver, graph_of
+from app.reporting import Reporter
 from app.review import Flips, Outcome, Row, Rows, counts, flips, queue
 from app.searching import SEARCH, WORKERS, Found
 from app.steps import Steps
 from segmap.errors import SegmapError
 from segmap.events import Choice, Event, IntegrationId
-from segmap.export import thumbnail
+from segmap.export import Record, thumbnail
 from segmap.integration import Match, chosen_heuristic, match_maps
 from segmap.merging import Component
 from segmap.project import ProjectState
@@ -73,7 +74,8 @@ class Session(Steps):
             prepare=self._prepare,
             workers=workers,
         )
-        solve = Solver()
+        self._solve = solve = Solver()
+        self._reporter = Reporter(self._inputs.segment_map, self._matching.outcome, self._inputs.facts)
         self.loops = Loops(
             self,
             solve=solve,
@@ -246,6 +248,11 @@ class Session(Steps):
             ProjectError: it takes longer, or cannot be computed.
         """
         return self._map.wait(timeout)
+
+    def record(self) -> Record:
+        """All a report tells beside the map: decisions, evidence, the pose graph of what is accepted now."""
+        state = self._state
+        return self._reporter.record(state, graph_of(state, self._solve), self.scan_ids)
 
     # --- listening, and the end -------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""``serve``, ``export`` and ``replay`` projects; write the ``sample`` logs."""
+"""``serve``, ``export``, ``report`` and ``replay`` projects; write the ``sample`` logs."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ import typer
 
 from app.cli.options import one_of
 from app.inputs import Inputs
+from app.matching import Settings, recall
 from app.merged import exportable, merge_project
-from segmap.export import FORMATS, RESOLUTION, format_of, write_files
+from app.posegraph import Solver, graph_of
+from app.reporting import Reporter
+from segmap.export import FORMATS, RESOLUTION, ExportFormat, format_of, write_files
 from segmap.simulate import write_samples
 from segmap.store import Store
 
-__all__ = ["export", "replay", "sample", "serve"]
+__all__ = ["export", "replay", "report", "sample", "serve"]
 
 Project = Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file, .segmap.", show_default=False)]
 
@@ -60,12 +63,32 @@ def export(
 
     Where a format takes several files, the others are put beside the one that is named.
     """
-    format_of(to)
+    _write(project, out, format_of(to), resolution)
+
+
+def report(
+    project: Project,
+    out: Annotated[Path, typer.Option(metavar="PATH", help="The file to write.", show_default=False)],
+) -> None:
+    """Write the report of a project as one HTML file: how far to trust its map, and on what evidence.
+
+    It opens offline, in any browser, and can be printed.
+    """
+    _write(project, out, format_of("report"))
+
+
+def _write(project: Path, out: Path, kind: ExportFormat, resolution: float = RESOLUTION) -> None:
     with Store.open(project) as store:
-        inputs = Inputs(store, store.state.logs, store.log_bytes)
-        merged = merge_project(store.state, inputs.segment_map)
-        content = exportable(store.state, merged, lambda scan: inputs.scan(scan).time, out.stem, resolution)
-    write_files(content, out, to)
+        state, solve = store.state, Solver()
+        inputs = Inputs(store, state.logs, store.log_bytes)
+        merged = merge_project(state, inputs.segment_map, solve=solve)
+        record = None
+        if kind.needs_record:
+            found = recall(store, Settings(state.parameters, state.mode))
+            reporter = Reporter(inputs.segment_map, found, inputs.facts)
+            record = reporter.record(state, graph_of(state, solve), inputs.scan_ids)
+        content = exportable(state, merged, lambda scan: inputs.scan(scan).time, out.stem, resolution, record)
+        write_files(content, out, kind.name)
 
 
 def replay(project: Project) -> None:

@@ -250,8 +250,11 @@ def export(session: Opened, format: str, resolution: Resolution = RESOLUTION) ->
     if format not in FORMATS:
         raise UnknownError(f"There is no export format {format[:80]!r}. Formats are: {', '.join(FORMATS)}.")
     state, merged = session.state, session.merged(MERGING_SECONDS)
-    content = exportable(state, merged, lambda scan: session.scan(scan).time, _plain(state.name), resolution)
-    kind, file = FORMATS[format], in_one(export_files(content, format), format)
+    kind = FORMATS[format]
+    record = session.record() if kind.needs_record else None
+    stem = _plain(state.name)
+    content = exportable(state, merged, lambda scan: session.scan(scan).time, stem, resolution, record)
+    file = in_one(export_files(content, format), format)
     suffix, media_type = (".zip", "application/zip") if kind.several else (kind.suffix, kind.media_type)
     return Response(file, media_type=media_type, headers=_attached(state.name, suffix))
 

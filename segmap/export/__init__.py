@@ -17,6 +17,8 @@ from segmap.export.dxf import DXF
 from segmap.export.files import packed, write_whole
 from segmap.export.geojson import GEOJSON
 from segmap.export.png import PNG
+from segmap.export.record import LogTold, PairTold, Record
+from segmap.export.report import REPORT
 from segmap.export.ros import ROS_MAP
 from segmap.export.svg import SVG, thumbnail
 from segmap.export.table import CSV
@@ -28,7 +30,10 @@ __all__ = [
     "Content",
     "ExportFormat",
     "Files",
+    "LogTold",
     "MapComponent",
+    "PairTold",
+    "Record",
     "by_suffix",
     "export_files",
     "export_map",
@@ -39,7 +44,9 @@ __all__ = [
     "write_map",
 ]
 
-FORMATS: dict[str, ExportFormat] = {format.name: format for format in (ROS_MAP, DXF, SVG, PNG, GEOJSON, CSV, TUM)}
+FORMATS: dict[str, ExportFormat] = {
+    format.name: format for format in (ROS_MAP, DXF, SVG, PNG, GEOJSON, CSV, TUM, REPORT)
+}
 """Every format written, by name."""
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol, TypeAlias
 
+from segmap.export.record import Record
 from segmap.graph import Edge
 from segmap.pose import Pose2
 from segmap.scans import ScanId
@@ -59,6 +60,8 @@ class Content:
     """metres, the side of a cell, for formats that are made of cells"""
     edges: Sequence[Edge] = ()
     """the accepted integrations with their covariances, for formats that hold a pose graph"""
+    record: Record | None = None
+    """decisions and evidence, for formats that tell of them"""
 
     @cached_property
     def _by_first(self) -> Mapping[str, list[tuple[int, str, str]]]:
@@ -94,6 +97,8 @@ class ExportFormat:
     """for people"""
     several: bool = False
     """whether it takes more than one file; they travel as one zip archive"""
+    needs_record: bool = False
+    """whether it tells of decisions and evidence, too"""
 
 
 def scans_of(sources: Sequence[Source]) -> list[ScanId]:

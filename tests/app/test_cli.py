@@ -29,7 +29,7 @@ from segmap.store import Store
 
 OFFICE, HALL = (str(samples_folder() / name) for name in ("office.log", "hall.log"))
 FIRST, SECOND = (str(samples_folder() / f"two-robots-{letter}.log") for letter in "ab")
-COMMANDS = ("serve", "info", "segments", "integrate", "merge", "export", "replay", "benchmark", "sample")
+COMMANDS = ("serve", "info", "segments", "integrate", "merge", "export", "report", "replay", "benchmark", "sample")
 SCANS = [len(read_log(log)) for log in (FIRST, SECOND)]
 RANGES = " ".join(["2.50"] * 90 + ["81.83"] * 90)
 RECORD = f"FLASER 180 {RANGES} 0 0 0 0 0 0 1.0 host 1.0\n"
