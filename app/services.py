@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from app.jobs import WarmUp
 from app.streams import Streams
 from app.views import Views
+from app.walks import Walks
 from app.workspace import Workspace
 
 __all__ = ["Services"]
@@ -14,11 +15,12 @@ __all__ = ["Services"]
 
 @dataclass(frozen=True)
 class Services:
-    """The projects, the open views, the event streams, and the kernels' compilation."""
+    """The projects, the open views, the event streams, the walkthroughs, and the kernels' compilation."""
 
     workspace: Workspace
     views: Views = field(default_factory=Views)
     streams: Streams = field(default_factory=Streams)
+    walks: Walks = field(default_factory=Walks)
     warm_up: WarmUp | None = None
 
     def start(self) -> None:

@@ -23,6 +23,7 @@ from app.cli import (
     projects,
     public_data,
     searching,
+    walking,
 )
 from app.resources import program_version
 from segmap.errors import SegmapError
@@ -53,6 +54,7 @@ cli.command()(searching.loops)
 cli.add_typer(public_data.datasets)
 cli.add_typer(benchmarking.benchmark)
 cli.command()(evaluating.evaluate)
+cli.command()(walking.walkthrough)
 cli.command()(projects.sample)
 
 

@@ -51,7 +51,7 @@ from segmap.merging import Component as MapComponent
 from segmap.parameters import PRESETS, describe
 from segmap.project import ProjectState
 
-__all__ = ["router"]
+__all__ = ["attached", "router"]
 
 router = APIRouter(prefix="/api", tags=["projects"])
 
@@ -256,7 +256,7 @@ def export(session: Opened, format: str, resolution: Resolution = RESOLUTION) ->
     content = exportable(state, merged, lambda scan: session.scan(scan).time, stem, resolution, record)
     file = in_one(export_files(content, format), format)
     suffix, media_type = (".zip", "application/zip") if kind.several else (kind.suffix, kind.media_type)
-    return Response(file, media_type=media_type, headers=_attached(state.name, suffix))
+    return Response(file, media_type=media_type, headers=attached(state.name, suffix))
 
 
 @router.get("/projects/{project}/download", response_class=FileResponse)
@@ -269,13 +269,13 @@ def download(site: Site, project: str) -> FileResponse:
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
-    headers = _attached(state.name, ".segmap")
+    headers = attached(state.name, ".segmap")
     return FileResponse(
         folder / "copy.segmap", media_type="application/vnd.sqlite3", headers=headers, background=remove
     )
 
 
-def _attached(name: str, suffix: str) -> dict[str, str]:
+def attached(name: str, suffix: str) -> dict[str, str]:
     """The header that saves an answer as a file of this name; what a name may not hold is encoded."""
     plain, full = _plain(name) + suffix, quote(base_name(name) + suffix, safe="")
     return {"Content-Disposition": f"attachment; filename=\"{plain}\"; filename*=utf-8''{full}"}

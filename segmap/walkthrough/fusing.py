@@ -112,7 +112,9 @@ class _Growth:
 def polylines_stage(trace: Trace, parameters: Parameters) -> list[Stage]:
     """P0, P1, ... of every chain, greedy and plain, and the two compared; none where there is no chain."""
     all_members = _members(trace)
-    held = _Polylines(all_members, parameters)
+    fused = trace.last("fused")
+    firsts_of = [len(chain.first) for chain in fused["chains"]] if fused else []
+    held = _Polylines(all_members, firsts_of, parameters)
     if not held.states:
         return []
     largest = max(range(len(all_members)), key=lambda c: len(all_members[c]))
@@ -142,7 +144,8 @@ def _members(trace: Trace) -> list[SegmentMap]:
 
 
 class _Polylines:
-    def __init__(self, members: Sequence[SegmentMap], parameters: Parameters) -> None:
+    def __init__(self, members: Sequence[SegmentMap], firsts: Sequence[int], parameters: Parameters) -> None:
+        self._firsts = firsts
         self.members, self.tolerance = members, parameters.fusion_tolerance
         self.lines: dict[tuple[int, str], Polyline] = {}
         self.states: list[_Growth] = []
@@ -206,7 +209,8 @@ class _Polylines:
         return Step("12", say, shapes, told, box=self._box(state))
 
     def _chain(self, state: _Growth) -> list[Shape]:
-        return [lines(state.members.coordinates, "first", width=3)]
+        rows, first = state.members.coordinates, self._firsts[state.chain]
+        return [lines(rows[:first], "first", width=3), lines(rows[first:], "second", width=3)]
 
     def _box(self, state: _Growth) -> Box | None:
         return around(state.members.coordinates, margin=0.12, least=0.15)

@@ -100,7 +100,7 @@ class _Scan:
         else:
             say = (
                 f"Cluster {bend.cluster + 1} is done: no point lies farther than {tolerance:.3f} m from its line."
-                f" Its {_count(len(bend.corners) - 1, 'straight piece')} will be segments."
+                f" It gives {_count(len(bend.corners) - 1, 'segment')}."
             )
         shapes: list[Shape] = [_sensor(), points(self.points, "faint")]
         shapes += [points(self.clusters[bend.cluster], self.role), path(bend.corners, "new", width=2.5)]

@@ -204,7 +204,8 @@ class _Pairs:
         rows, sums = self._sums
         total = float(sums[int(np.searchsorted(rows, row, side="right"))])
         i, j = term.first, term.second
-        shapes = [*self._background(), *self._two(i, j), *self._measured(i, j)]
+        covered, distances = self._measured(i, j)
+        shapes = [*self._background(), *covered, *self._two(i, j), *distances]
         told: tuple[Quantity, ...] = (metres("distance d", term.distance), ("d / tolerance", f"{tolerances:.2f}", ""))
         told += (("threshold", f"{p.segment_distance_threshold:g}", ""), metres("l1", term.common_1))
         told += (metres("l2", term.common_2), ("penalty factor", f"{term.factor:.4f}", ""))
@@ -216,13 +217,13 @@ class _Pairs:
     def _sentence(self, term: PairTerm, tolerances: float) -> tuple[str, str]:
         i, j, p = term.first, term.second, self.parameters
         pair = f"Segment {i} of map 1 and segment {j} of map 2"
-        if max(term.common_1, term.common_2) <= 0.0:
-            return "14", f"{pair} lie beside no part of each other, so they have nothing in common: this adds 0."
         if tolerances > p.segment_distance_threshold:
             return "10", (
                 f"{pair} are {term.distance:.3f} m apart, {tolerances:.1f} tolerances; more than"
                 f" {p.segment_distance_threshold:g} cannot be the same wall: this adds 0."
             )
+        if max(term.common_1, term.common_2) <= 0.0:
+            return "14", f"{pair} lie beside no part of each other, so they have nothing in common: this adds 0."
         half = f"{term.common_1:.2f} m of the one and {term.common_2:.2f} m of the other"
         if term.factor == 1.0:
             return "18", f"{pair} touch and have {half} in common: the mean, {term.value:.3f} m, counts in full."
@@ -238,9 +239,10 @@ class _Pairs:
     def _two(self, i: int, j: int) -> list[Shape]:
         return [of("first", "first", [i], width=4), of("second", "second", [j], self.T_1_2, width=4)]
 
-    def _measured(self, i: int, j: int) -> list[Shape]:
-        """The four distances a, b, c, d of Fig. 2, and what each covers of the other."""
+    def _measured(self, i: int, j: int) -> tuple[list[Shape], list[Shape]]:
+        """What each segment covers of the other, and the four distances a, b, c, d of Fig. 2."""
         one, other = self.map_1.coordinates[i], self.moved.coordinates[j]
+        covered: list[Shape] = []
         shapes: list[Shape] = []
         for names, line, segment in (("ab", one, other), ("cd", other, one)):
             start, along = line[:2], line[2:] - line[:2]
@@ -253,8 +255,8 @@ class _Pairs:
                 shapes.append(text((end + foot) / 2.0, name, "accent"))
             first, last = max(0.0, min(places)), min(length, max(places))
             if last > first:
-                shapes.append(lines(np.concatenate((start + first * unit, start + last * unit)), "good", width=7))
-        return [*[shape for shape in shapes if shape["role"] == "good"], *[s for s in shapes if s["role"] != "good"]]
+                covered.append(lines(np.concatenate((start + first * unit, start + last * unit)), "good", width=10))
+        return covered, shapes
 
     def _box(self, i: int, j: int) -> tuple[float, float, float, float] | None:
         return around(self.map_1.coordinates[i], self.moved.coordinates[j], margin=0.2, least=0.3)

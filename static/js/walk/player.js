@@ -76,7 +76,7 @@ export class Player extends EventTarget {
 
   play() {
     if (this.playing) return this.pause();
-    set(this.#parts.play, true);
+    pressed(this.#parts.play, true);
     const tick = async () => {
       const before = JSON.stringify(this.place);
       await this.next();
@@ -90,7 +90,7 @@ export class Player extends EventTarget {
   pause() {
     clearTimeout(this.#timer);
     this.#timer = 0;
-    set(this.#parts.play, false);
+    pressed(this.#parts.play, false);
   }
 
   async #find(id) {
@@ -141,13 +141,13 @@ export class Player extends EventTarget {
     const step = await this.#load(stage, number);
     if (asked !== this.#asked) return;
     this.shown = step;
-    const { parts: held } = { parts: this.#parts };
+    const held = this.#parts;
     text(held.say, step.say);
     held.figure.show(step.shapes, this.#walk.base, step.box ?? stage.box ?? [-5, -5, 5, 5]);
     fill(held.quantities, step.quantities.map(quantity));
     this.#charts(stage, step);
     for (const row of held.lines.children) row.toggleAttribute("data-current", row.dataset.number === step.line);
-    held.lines.querySelector("[data-current]")?.scrollIntoView({ block: "nearest" });
+    requestAnimationFrame(() => show(held.lines, held.lines.querySelector("[data-current]")));
     Object.assign(held.slider, { value: number });
     text(held.count, `${number + 1} / ${stage.count}`);
     held.entered.hidden = !step.enter;
@@ -209,7 +209,7 @@ function layout(p, walk) {
   return [
     h("nav.walk-stages", { "aria-label": "Stages of the run" }, h("p.walk-title", {}, walk.title), p.stages),
     h("section.walk-picture", { "aria-label": "Picture" }, p.figure.element, h("div.controls", {}, p.slider, h("div.buttons", {}, controls))),
-    h("section.walk-words", { "aria-label": "What happens" }, p.title, p.say, p.entered, p.quantities, p.charts, p.paper, h("details", {}, h("summary", {}, "What this stage is about"), p.about), p.algorithm, p.lines),
+    h("section.walk-words", { "aria-label": "What happens" }, h("div.walk-told", {}, p.title, p.about, p.say, p.entered, p.quantities, p.charts, p.paper), p.algorithm, p.lines),
   ];
 }
 
@@ -225,13 +225,21 @@ function quantity([name, value, unit]) {
   return h("div", {}, h("dt", {}, name), h("dd.number", {}, unit ? `${value} ${unit}` : value));
 }
 
+/** Bring a line into sight within its list, and nothing else. */
+function show(list, current) {
+  if (!current) return;
+  const [top, bottom] = [current.offsetTop - list.offsetTop, current.offsetTop - list.offsetTop + current.offsetHeight];
+  if (top < list.scrollTop) list.scrollTop = top - 30;
+  else if (bottom > list.scrollTop + list.clientHeight) list.scrollTop = bottom - list.clientHeight + 30;
+}
+
 function numbered(stage, step) {
   if (step === "last") return stage.count - 1;
   const index = stage.marks.find(([, label]) => label === step)?.[0];
   return index ?? (Number.isFinite(Number(step)) ? Number(step) : 0);
 }
 
-function set(button, playing) {
+function pressed(button, playing) {
   text(button, playing ? "❚❚ Pause" : "▶ Play");
   button.setAttribute("aria-pressed", String(playing));
 }

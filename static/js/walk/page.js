@@ -1,0 +1,101 @@
+// The page of a walkthrough: what is walked through stands in the address, and so does the step that is shown.
+
+import { get } from "../api.js";
+import { byId, fill, h, text } from "../dom.js";
+import { failed } from "../notices.js";
+import { Player } from "./player.js";
+
+const AHEAD = 12;
+const QUESTION = ["project", "sample", "pair", "mode", "heuristic", "set"];
+
+const question = new URLSearchParams(location.search);
+const known = new Map();
+
+start().catch(unavailable);
+
+async function start() {
+  const walk = await get(`/api/walk?${asked()}`);
+  choices(walk);
+  text(byId("name"), walk.title);
+  document.title = `${walk.title} – segmap`;
+  const player = new Player(byId("player"), { ...walk, title: "Stages" }, { load, open });
+  player.addEventListener("step", ({ detail }) => remember(detail));
+  byId("player").setAttribute("aria-busy", "false");
+  await player.go(question.get("stage") || walk.stages[0].id, question.get("step") ?? 0);
+  if (question.get("play") !== null) player.play();
+  addEventListener("popstate", () => location.reload());
+}
+
+/** The part of the address that says what is walked through, with more for one request. */
+function asked(more = {}) {
+  const held = [...question].filter(([name]) => QUESTION.includes(name));
+  return new URLSearchParams([...held, ...Object.entries(more)]);
+}
+
+async function open(stage) {
+  try {
+    return await get(`/api/walk/stage?${asked({ stage })}`);
+  } catch (error) {
+    return failed(error), null;
+  }
+}
+
+/** A step: the one asked for at once, those after it for when they are wanted. */
+async function load(stage, number) {
+  const key = (place) => `${stage.id} ${place}`;
+  if (!known.has(key(number))) keep(stage, number, 1);
+  const step = await known.get(key(number));
+  const next = number + 1;
+  if (next < stage.count && !known.has(key(next))) keep(stage, next, Math.min(AHEAD, stage.count - next));
+  return step;
+}
+
+function keep(stage, start, count) {
+  const answer = get(`/api/walk/steps?${asked({ stage: stage.id, start, count })}`);
+  for (let place = 0; place < count; place += 1) {
+    const step = answer.then(({ steps }) => steps[place]);
+    known.set(`${stage.id} ${start + place}`, step);
+    step.catch(() => known.delete(`${stage.id} ${start + place}`));
+  }
+}
+
+function remember({ stage, step }) {
+  const there = new URLSearchParams([...asked(), ["stage", stage], ["step", step]]);
+  history.replaceState(null, "", `?${there}`);
+}
+
+function choices(walk) {
+  byId("pair").value = walk.pair;
+  options(byId("mode"), walk.modes, walk.mode);
+  options(byId("heuristic"), walk.heuristics, walk.heuristic);
+  byId("mode").addEventListener("change", () => (byId("heuristic").value = ""));
+  byId("how").addEventListener("submit", (event) => (event.preventDefault(), again()));
+  const project = question.get("project");
+  const back = project && h("a.button", { href: `/projects/${encodeURIComponent(project)}` }, "Back to the project");
+  fill(byId("tools"), saving(), back);
+}
+
+/** The walkthrough as a file. */
+function saving() {
+  const kinds = [["html", "One page that plays offline"], ["zip", "Numbered pictures (PNG)"], ["gif", "Animation (GIF)"]];
+  const link = ([kind, words]) => h("li", {}, h("a", { href: `/api/walk/file/${kind}?${asked()}`, download: "" }, words));
+  return h("details.menu", {}, h("summary.button", {}, "Save"), h("ul", {}, kinds.map(link)));
+}
+
+function options(select, names, chosen) {
+  fill(select, names.map((name) => h("option", { value: name, selected: name === chosen }, name)));
+  select.value = chosen;
+}
+
+/** The same scans or others, integrated in another way. */
+function again() {
+  const there = new URLSearchParams([...question].filter(([name]) => ["project", "sample", "set"].includes(name)));
+  for (const name of ["pair", "mode", "heuristic"]) if (byId(name).value) there.set(name, byId(name).value);
+  location.assign(`?${there}`);
+}
+
+function unavailable(error) {
+  const button = h("button", { type: "button", onclick: () => location.reload() }, "Try again");
+  fill(byId("player"), h("div.message.error", { role: "alert" }, h("p", {}, error.message), h("div.row", {}, button)));
+  byId("player").setAttribute("aria-busy", "false");
+}

@@ -1,0 +1,117 @@
+"""Walkthroughs over the API and on the command line: any step of any stage, files that hold them, bad questions."""
+
+import io
+import json
+import re
+import zipfile
+
+import pytest
+from PIL import Image
+
+from app.resources import samples_folder, static_folder
+from app.walk_pictures import ROLES
+
+HALL = {"sample": "laboratory", "pair": "0.0-0.1", "heuristic": "consecutive"}
+
+
+def test_stages_then_any_step(client):
+    """The overview names stages with their counts; steps come in any order and are the same each time."""
+    walk = client.get("/api/walk", params=HALL).json()
+    assert walk["pair"] == "0.0-0.1"
+    assert walk["heuristics"][0] == "all"
+    stages = {stage["id"]: stage for stage in walk["stages"]}
+    assert list(stages)[:3] == ["points-1", "points-2", "angles-1"]
+    assert set(walk["algorithms"]) >= {stage["algorithm"] for stage in walk["stages"]}
+    last = stages["evaluation"]["count"] - 1
+    ask = lambda start, count=1: client.get(  # noqa: E731
+        "/api/walk/steps", params={**HALL, "stage": "evaluation", "start": start, "count": count}
+    ).json()["steps"]
+    backwards = [ask(k)[0] for k in range(last, -1, -1)]
+    assert ask(0, 64) == backwards[::-1]
+
+
+def test_a_candidate_can_be_entered(client):
+    """What a step says can be entered is a stage of its own."""
+    step = client.get("/api/walk/steps", params={**HALL, "stage": "evaluation", "start": 1}).json()["steps"][0]
+    entered = client.get("/api/walk/stage", params={**HALL, "stage": step["enter"]["stage"]}).json()
+    assert entered["id"] == "pairs:1"
+    assert entered["count"] > 1
+
+
+def test_of_a_project(client, project):
+    """The scans of a project are walked through with its own mode, heuristic and parameters."""
+    walk = client.get("/api/walk", params={"project": project, "pair": "0.1-0.2"}).json()
+    assert walk["mode"] == "verified"
+    assert {"refinement", "sight", "result"} <= {stage["id"] for stage in walk["stages"]}
+    assert not walk["truth"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "status", "words"),
+    [
+        ({}, 400, "project or of a sample"),
+        ({"sample": "hall", "project": "x"}, 400, "name one"),
+        ({"sample": "nowhere"}, 404, "no sample"),
+        ({"project": "../x"}, 404, "no project"),
+        ({"sample": "hall", "pair": "0.0"}, 400, "0.0-0.1"),
+        ({"sample": "hall", "pair": "0.0-0.999"}, 400, "no scan 999"),
+        ({"sample": "hall", "pair": "0.0-7.0"}, 404, "no log 7"),
+        ({"sample": "hall", "mode": "magic"}, 400, "no mode"),
+        ({"sample": "hall", "heuristic": "magic"}, 400, "no heuristic"),
+        ({"sample": "hall", "set": "magic=1"}, 400, "magic"),
+        ({"sample": "hall", "set": "magic"}, 400, "NAME=VALUE"),
+        ({"sample": "hall", "color": "red"}, 422, "color"),
+    ],
+)
+def test_questions_that_make_no_sense(client, asked, status, words):
+    """Each is answered in one sentence."""
+    answer = client.get("/api/walk", params=asked)
+    assert answer.status_code == status, answer.text
+    assert words in answer.json()["error"]["message"]
+
+
+@pytest.mark.parametrize(
+    ("more", "status"),
+    [({"stage": "nowhere"}, 404), ({"stage": "points-1", "start": 10**6}, 404), ({"stage": "a", "count": 1000}, 422)],
+)
+def test_steps_that_are_not_there(client, more, status):
+    """A stage or a step that does not exist is said so."""
+    assert client.get("/api/walk/steps", params={**HALL, **more}).status_code == status
+
+
+def test_files(client):
+    """The page holds every stage and fetches nothing; the archive holds numbered PNGs, the animation its frames."""
+    page = client.get("/api/walk/file/html", params=HALL)
+    assert "attachment" in page.headers["content-disposition"]
+    held = json.loads(re.search(r'<script type="application/json" id="walk">(.*?)</script>', page.text, re.S)[1])
+    assert list(held["steps"]) == [stage["id"] for stage in held["walk"]["stages"]]
+    assert all(len(held["steps"][stage["id"]]) == stage["count"] for stage in held["walk"]["stages"])
+    assert not re.search(r"""\b(?:src|href)\s*=\s*["']|@import|\bimport\b[^.]*\bfrom\b""", page.text.split("<main")[0])
+    archive = zipfile.ZipFile(io.BytesIO(client.get("/api/walk/file/zip", params={**HALL, "most": 12}).content))
+    names = archive.namelist()
+    assert [name[:3] for name in names] == [f"{k:03d}" for k in range(1, len(names) + 1)]
+    assert Image.open(archive.open(names[0])).size == (1280, 720)
+    chain = {**HALL, "stage": "chains", "most": 4}
+    assert Image.open(io.BytesIO(client.get("/api/walk/file/gif", params=chain).content)).n_frames > 1
+    assert client.get("/api/walk/file/exe", params=HALL).status_code == 400
+    assert client.get("/api/walk/file/zip", params={**HALL, "stage": "x"}).status_code == 404
+
+
+def test_colours_of_files_are_those_of_the_page():
+    """Images and the player give each role one colour."""
+    css = (static_folder() / "css" / "walk.css").read_text()
+    light = dict(re.findall(r"--((?:role|chain)-[\w-]+): (#\w{6});", css.split("@media")[0]))
+    told = {name.removeprefix("role-"): colour for name, colour in light.items()}
+    assert {name: ROLES[name] for name in told} == told
+
+
+def test_command(run, tmp_path):
+    """The command writes what the suffix says, and says no to another."""
+    log = samples_folder() / "hall.log"
+    out = tmp_path / "hall.html"
+    status, told, _ = run("walkthrough", log, 0, 1, "--out", out, "--mode", "paper", "--heuristic", "random")
+    assert status == 0
+    assert "stages" in told
+    assert "Hall" in out.read_text() or "hall.log" in out.read_text()
+    assert run("walkthrough", log, 0, 1, "--out", tmp_path / "hall.mp4")[0] == 2
+    assert run("walkthrough", log, 0, 999, "--out", out)[0] == 2

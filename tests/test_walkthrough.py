@@ -1,0 +1,154 @@
+"""A walkthrough shows the run that happened, in any order, as plain data."""
+
+import json
+
+import numpy as np
+import pytest
+
+from app.resources import samples_folder
+from segmap.integration import integrate
+from segmap.logs import read_log
+from segmap.parameters import Parameters, preset
+from segmap.pose import Pose2
+from segmap.segments import SegmentMap, extract
+from segmap.walkthrough import ALGORITHMS, walk_maps, walk_scans
+
+WAYS = [("paper", name) for name in ("all", "consecutive", "random", "histogram")]
+WAYS += [("verified", name) for name in (None, "extremes")]
+
+
+@pytest.fixture(scope="module")
+def scans():
+    """Two neighbouring scans of the cluttered laboratory."""
+    log = read_log(samples_folder() / "laboratory.log")
+    return log[0], log[1]
+
+
+@pytest.fixture(scope="module", params=WAYS, ids=lambda way: "-".join(map(str, way)))
+def made(request, scans):
+    """A walkthrough by each heuristic, in both modes."""
+    mode, heuristic = request.param
+    return walk_scans(*scans, preset("verified" if mode == "verified" else "default"), heuristic, mode)
+
+
+def some(stage, most=60):
+    """Numbers of steps: all of few, the first, the last, the marked and some of many."""
+    even = range(0, stage.count, max(1, stage.count // most))
+    return sorted({*even, stage.count - 1, *(mark.index for mark in stage.marks), *stage.stops[:20]})
+
+
+def test_the_run_is_the_one_without_recording(made, scans):
+    """What is walked through is what INTEGRATE gives by itself."""
+    match = made.integration.match
+    parameters = preset("verified" if match.mode == "verified" else "default")
+    maps = [extract(scan, parameters) for scan in scans]
+    plain = integrate(*maps, parameters, match.heuristic, match.mode).match
+    assert plain.ranked == match.ranked
+    assert len(made.found) == plain.candidates
+    if match.mode == "paper" and plain.best is not None:
+        assert made.found.best == plain.best.index
+        assert made.found.values[made.found.best] == plain.value
+        assert len(made.found.discarded) == plain.discarded
+
+
+def test_every_step_is_plain_data_with_a_line_that_exists(made):
+    """Each step can be sent, names a line of its stage's algorithm, and says something."""
+    for stage in made.walk.stages:
+        numbers = {line.number for line in ALGORITHMS[stage.algorithm].lines}
+        json.dumps(stage.to_json(), allow_nan=False)
+        for k in some(stage):
+            told = stage.step(k).to_json()
+            json.dumps(told, allow_nan=False)
+            assert told["line"] in numbers, (stage.id, k)
+            assert len(told["say"]) > 20
+            assert all(shape.get("of", "first") in made.walk.base for shape in told["shapes"])
+
+
+def test_forward_then_back_is_the_same_picture(made):
+    """A step is the same whichever way one comes to it."""
+    for stage in made.walk.stages:
+        numbers = some(stage, most=15)
+        forward = [stage.step(k).to_json() for k in numbers]
+        assert [stage.step(k).to_json() for k in reversed(numbers)] == forward[::-1], stage.id
+
+
+def test_the_best_candidate_is_marked(made):
+    """One can jump to the moment the best was found, and the picture there has its pose and its value."""
+    found = made.found
+    stage = made.walk.stage("evaluation")
+    if found.best is None:
+        pytest.skip("nothing was found")
+    (at,) = [mark.index for mark in stage.marks if mark.label == "the moment the best candidate was found"]
+    step = stage.step(at)
+    assert step.line == "21"
+    assert ("value", f"{found.values[found.best]:.3f}", "m") in step.quantities
+    pose = next(shape["pose"] for shape in step.shapes if shape.get("of") == "second")
+    np.testing.assert_allclose(pose, found.held.poses[found.best], atol=1e-6)
+
+
+def test_pair_by_pair_adds_up_to_the_value(made):
+    """The last pair of a candidate says the value that the kernel gives it."""
+    found = made.found
+    alive = np.flatnonzero(found.values > 0.0)[:3]
+    for k in alive.tolist():
+        stage = made.walk.stage(f"pairs:{k + 1}")
+        told = {name: value for name, value, _ in stage.step(stage.count - 1).quantities}
+        assert told["value so far"] == f"{found.values[k]:.3f}"
+    assert made.walk.stage("pairs:0") is None
+    assert made.walk.stage(f"pairs:{len(found) + 1}") is None
+    assert made.walk.stage("pairs:x") is None
+
+
+def test_a_discarded_candidate_says_which_segments_cross(made):
+    """The reason is there in words, with the crossing marked, and pair by pair as well."""
+    found = made.found
+    if not len(found.discarded):
+        pytest.skip("nothing is discarded here")
+    k = int(found.discarded[0])
+    step = made.walk.stage("evaluation").step(k + 1)
+    assert step.line == "7"
+    assert "cross" in step.say
+    assert any(shape.get("mark") == "cross" for shape in step.shapes)
+    pairs = made.walk.stage(f"pairs:{k + 1}")
+    assert "7" in {pairs.step(mark.index).line for mark in pairs.marks}
+
+
+def test_points_end_as_the_segments_of_the_scan(made):
+    """Bend by bend the polylines become the segments, each bend through the farthest point."""
+    stage = made.walk.stage("points-1")
+    last = stage.step(stage.count - 1)
+    assert ("segments", str(len(made.walk.base["first"])), "") in last.quantities
+    for k in range(2, stage.count - 1):
+        step = stage.step(k)
+        (distance,) = [float(value) for name, value, _ in step.quantities if name.startswith("farthest")]
+        assert (distance > 0.03 - 5e-4) if step.line in "34" else distance <= 0.03 + 5e-4
+
+
+def test_chains_end_as_those_of_the_match(made):
+    """After the last pair there are as many chains as the match has."""
+    match = made.integration.match
+    if match.T_1_2 is None:
+        pytest.skip("nothing was found")
+    stage = made.walk.stage("chains")
+    assert ("chains so far", str(len(match.chains)), "") in stage.step(stage.count - 1).quantities
+
+
+def test_every_pair_left_out_says_why():
+    """Consecutive and histogram give a reason for each pair of segments they do not take."""
+    room = SegmentMap(
+        np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 3.9, 3.05], [3.9, 3.05, 0, 3], [0, 3, -1, 2.0]]), "beams"
+    )
+    for heuristic, words in (("consecutive", ("shorter than", "follow each other")), ("histogram", ("bucket",))):
+        walk = walk_maps(room, room.moved(Pose2(0.3, 0.1, 0.4)), Parameters(), heuristic).walk
+        said = " ".join(walk.stage("angles-1").step(k).say for k in range(11))
+        assert all(word in said for word in words)
+        assert "not asked for" not in said
+
+
+def test_nothing_to_see_is_said():
+    """Two maps without a candidate give a walkthrough that ends in a verdict with its reason."""
+    empty = SegmentMap.empty()
+    walk = walk_maps(empty, empty).walk
+    assert [stage.id for stage in walk.stages][-1] == "result"
+    last = walk.stages[-1]
+    assert "no segments" in last.step(last.count - 1).say
