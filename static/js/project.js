@@ -22,6 +22,7 @@ import { summary } from "./summary.js";
 import { tabs } from "./tabs.js";
 import { Threshold } from "./threshold.js";
 import { View } from "./view.js";
+import { walkLink } from "./walks.js";
 
 const project = new Project(decodeURIComponent(location.pathname.split("/")[2] ?? ""));
 const view = new View(project);
@@ -36,7 +37,7 @@ async function start() {
   new Detail(project, view, [candidates, new Heuristics(project), new GraphWords(project)]);
   new Threshold(project, queue);
   new ParameterDrawer(project);
-  for (const part of [head, summary, exportMenu, inputs, loops, graphPanel]) part(project, view);
+  for (const part of [head, summary, exportMenu, inputs, loops, graphPanel, walkLink]) part(project, view);
   project.addEventListener("trouble", ({ detail }) => failed(detail));
   integrationLinks(byId("panel-map"), (id) => queue.select(id));
   keyboard();
