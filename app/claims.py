@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 from segmap.events import Proposal
@@ -12,7 +13,7 @@ from segmap.placing import judged_at
 from segmap.pose import Pose2
 from segmap.segments import SegmentMap
 
-__all__ = ["CLAIMED", "NUDGED", "claimed_rank", "described", "nudged_rank", "origin", "with_claim"]
+__all__ = ["CLAIMED", "NUDGED", "claimed_rank", "described", "nudged_rank", "origin", "suggested_rank", "with_claim"]
 
 CLAIMED = -1
 """the ``index`` of a candidate that no search on this pair found"""
@@ -55,10 +56,18 @@ def _rank_at(match: Match, T_1_2: Pose2) -> int | None:
     return next((rank for rank, same in enumerate(near) if same), None)
 
 
+def suggested_rank(proposal: Proposal | None, match: Callable[[], Match | None]) -> int:
+    """The rank of the candidate to begin with: where our own search says that the scans lie, else the best."""
+    if proposal is None or proposal.kind != "closure":
+        return 0
+    found = match()
+    return 0 if found is None else claimed_rank(found, proposal) or 0
+
+
 def described(match: Match | None, proposal: Proposal) -> str:
     """A proposal in words, and how far our own match is from it."""
     said = {
-        "closure": "Found by the search for loop closures",
+        "closure": f"Found by the {proposal.source or 'search for loop closures'}",
         "imported": f"Imported from {proposal.source or 'a pose graph'}",
         "manual": "Laid by hand" if proposal.nudge else "Asked for by hand",
     }[proposal.kind]

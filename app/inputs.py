@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from app.errors import UnknownError
-from app.matching import ResultStore
+from app.kept import ResultStore
 from segmap.errors import SegmapError
 from segmap.logs import Limits, read_log
 from segmap.parameters import Parameters

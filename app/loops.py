@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 from app.deciding import covariance_at
 from app.jobs import Check
+from app.kept import ResultStore
 from app.posegraph import Graph, PoseGraph, Solver, edge
 from app.review import Fate, Outcome
-from app.searching import WORKERS, Found, LoopSearch, Searching, Told, find_closures
+from app.searching import WORKERS, Found, LoopSearch, Searching, find_closures
 from segmap.errors import ProjectError
 from segmap.graph import Preview
 from segmap.pose import Pose2
 from segmap.project import ProjectState
+from segmap.spreading import Told
 
 if TYPE_CHECKING:
     from app.session import Session
@@ -31,6 +33,7 @@ class Loops:
     def __init__(
         self,
         session: Session,
+        store: ResultStore,
         *,
         solve: Solver,
         prepare: Callable[[Check], None],
@@ -40,6 +43,7 @@ class Loops:
         workers: int = WORKERS,
     ) -> None:
         self._session, self._prepare, self._take, self._workers = session, prepare, take, workers
+        self._store = store
         self._graph = PoseGraph(lambda: session.state, solve, optimised)
         self._search = LoopSearch(self._find, lambda: searching({"type": "search", **self.progress.to_json()}))
         self.start, self.cancel = self._search.start, self._search.cancel
@@ -90,9 +94,14 @@ class Loops:
     def _find(self, progress: Told, check: Check) -> str:
         self._prepare(check)
         session = self._session
-        extract = session.extractor
         found = find_closures(
-            session.state, session.scan_ids, extract, workers=self._workers, progress=progress, check=check
+            session.state,
+            session.scan_ids,
+            session.extractor,
+            store=self._store,
+            workers=self._workers,
+            progress=progress,
+            check=check,
         )
         check()
         return self._take(found)

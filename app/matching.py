@@ -7,13 +7,12 @@ import json
 import logging
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol
-
-from pydantic import TypeAdapter
+from typing import Any
 
 from app.jobs import Backlog, Check
+from app.kept import ResultStore, keep_matches, kept_match, kept_outcomes
 from app.resources import program_version
 from app.review import THRESHOLDS, Outcome
 from segmap.errors import CancelledError, SegmapError
@@ -52,16 +51,6 @@ OWN = {
 """parameters that matter to one heuristic only"""
 
 log = logging.getLogger(__name__)
-_OUTCOME = TypeAdapter(Outcome)
-
-
-class ResultStore(Protocol):
-    """The cache of results in a project file."""
-
-    def put_result(self, key: str, text: str) -> None: ...
-    def put_results(self, texts: Mapping[str, str]) -> None: ...
-    def get_result(self, key: str) -> str | None: ...
-    def results(self, keys: Iterable[str]) -> Mapping[str, str]: ...
 
 
 @dataclass(frozen=True)
@@ -165,15 +154,6 @@ class Matching:
             self._done = len(self._integrations) - len(missing)
             self._backlog.replace([self._task(id, heuristic) for id in missing])
 
-    def keep(self, matches: Mapping[str, Match], settings: Settings, heuristic: str) -> None:
-        """Take in matches that somebody else found under these settings; they are not looked for again."""
-        tasks = [Task(id, heuristic, settings.key(heuristic)) for id in matches]
-        new = [task for task in tasks if self._wanted(task) and self.match(task.integration, heuristic) is None]
-        outcomes = {task: Outcome.of(matches[task.integration]) for task in new}
-        self._store_results({task: (matches[task.integration], outcomes[task]) for task in new})
-        for task in new:
-            self._record(task, outcomes[task], matches[task.integration])
-
     def _forget(self, heuristics: Iterable[str]) -> None:
         gone = set(heuristics)
         self._outcomes = {place: outcome for place, outcome in self._outcomes.items() if place[1] not in gone}
@@ -193,7 +173,7 @@ class Matching:
         place = (integration, heuristic)
         with self._lock:
             if place not in self._outcomes:
-                self._outcomes[place] = _outcome(self._store.get_result(self._outcome_key(self._task(*place))))
+                self._outcomes[place] = kept_outcomes(self._store, self._key(heuristic), [integration]).get(integration)
             return self._outcomes[place]
 
     def match(self, integration: str, heuristic: str) -> Match | None:
@@ -201,7 +181,7 @@ class Matching:
         place = (integration, heuristic)
         with self._lock:
             if place not in self._matches:
-                match = _match(self._store.get_result(self._match_key(self._task(*place))))
+                match = kept_match(self._store, self._key(heuristic), integration)
                 if match is None:
                     return None
                 self._keep(place, match)
@@ -211,16 +191,19 @@ class Matching:
     def _recall(self, heuristic: str) -> None:
         """Read what the project file holds of a heuristic, in one go."""
         missing = [id for id in self._integrations if self._outcomes.get((id, heuristic)) is None]
-        places = {self._outcome_key(self._task(id, heuristic)): (id, heuristic) for id in missing}
-        held = self._store.results(list(places))
-        self._outcomes = dict.fromkeys(places.values()) | self._outcomes
-        self._outcomes |= {places[key]: _outcome(text) for key, text in held.items()}
+        held = kept_outcomes(self._store, self._key(heuristic), missing)
+        self._outcomes = dict.fromkeys((id, heuristic) for id in missing) | self._outcomes
+        self._outcomes |= {(id, heuristic): outcome for id, outcome in held.items()}
 
     def _work(self, task: Task, check: Check) -> None:
         with self._lock:
             settings = self._settings
-            if settings is None or not self._wanted(task) or self.match(task.integration, task.heuristic) is not None:
+            if settings is None or not self._wanted(task):
                 return
+            held = self.match(task.integration, task.heuristic)
+        if held is not None:  # the search for loops found it meanwhile
+            self._record(task, Outcome.of(held), held)
+            return
         try:
             match = self._find(task.integration, task.heuristic, settings, check)
         except CancelledError:
@@ -236,7 +219,7 @@ class Matching:
     def _found(self, task: Task, match: Match) -> None:
         outcome = Outcome.of(match)
         if self._wanted(task):
-            self._store_results({task: (match, outcome)})
+            keep_matches(self._store, task.key, {task.integration: (match, outcome)})
         self._record(task, outcome, match)
 
     def _failed(self, task: Task, reason: str) -> None:
@@ -255,15 +238,6 @@ class Matching:
         if listed:
             self._told(*place)
 
-    def _store_results(self, found: Mapping[Task, tuple[Match, Outcome]]) -> None:
-        """Write results to the cache; a cache that cannot be written costs time later, nothing else."""
-        try:
-            full = {self._match_key(task): match.to_json() for task, (match, _) in found.items()}
-            short = {self._outcome_key(task): _OUTCOME.dump_json(one).decode() for task, (_, one) in found.items()}
-            self._store.put_results(full | short)
-        except SegmapError as error:
-            log.warning("The matches of %d pairs were not kept: %s", len(found), error)
-
     def _wanted(self, task: Task) -> bool:
         """False for results that come after the parameters were changed."""
         with self._lock:
@@ -275,40 +249,19 @@ class Matching:
             self._matches.popitem(last=False)
 
     def _task(self, integration: str, heuristic: str) -> Task:
-        return Task(integration, heuristic, self._keys.get(heuristic, ""))
+        return Task(integration, heuristic, self._key(heuristic))
 
-    @staticmethod
-    def _match_key(task: Task) -> str:
-        return f"match/{task.key}/{task.integration}"
-
-    @staticmethod
-    def _outcome_key(task: Task) -> str:
-        return f"outcome-2/{task.key}/{task.integration}"
+    def _key(self, heuristic: str) -> str:
+        return self._keys.get(heuristic, "")
 
 
 def recall(store: ResultStore, settings: Settings) -> Callable[[str, str], Outcome | None]:
     """What a project file holds of matches under these settings, by integration and heuristic; nothing is computed."""
 
     def outcome(integration: str, heuristic: str) -> Outcome | None:
-        task = Task(integration, heuristic, settings.key(heuristic))
-        return _outcome(store.get_result(Matching._outcome_key(task)))
+        return kept_outcomes(store, settings.key(heuristic), [integration]).get(integration)
 
     return outcome
-
-
-def _outcome(text: str | None) -> Outcome | None:
-    """The outcome a cache held; one that cannot be read is computed again."""
-    try:
-        return None if text is None else _OUTCOME.validate_json(text)
-    except ValueError:
-        return None
-
-
-def _match(text: str | None) -> Match | None:
-    try:
-        return None if text is None else Match.from_json(text)
-    except ValueError:
-        return None
 
 
 def _message(done: int, total: int, running: int, cancelled: bool) -> str:

@@ -164,7 +164,19 @@ class Rows:
         """The row as it would be under other thresholds; nothing is kept."""
         blank = self._blank[integration]
         blank = replace(blank, kind=kind_of(IntegrationId(blank.first, blank.second), state))
-        return row(blank, state.heuristic, outcome, state.decisions.get(integration), parameters)
+        found = row(blank, state.heuristic, outcome, state.decisions.get(integration), parameters)
+        return replace(found, **_LEFT_TO_A_PERSON) if _proposed_elsewhere(found, state, outcome) else found
+
+
+_LEFT_TO_A_PERSON: Mapping[str, Any] = {"verdict": str(Verdict.REVIEW), "above": False}
+
+
+def _proposed_elsewhere(found: Row, state: ProjectState, outcome: Outcome | None) -> bool:
+    """Whether our own search proposes another candidate than the best: what is said of that one is not said of it."""
+    proposal = state.proposals.get(found.id)
+    if found.state != "pending" or outcome is None or proposal is None or proposal.kind != "closure":
+        return False
+    return proposal.T_1_2 is not None and not _same(proposal.T_1_2, outcome.pose)
 
 
 def _settings(state: ProjectState, integration: str) -> tuple[Any, ...]:

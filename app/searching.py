@@ -5,15 +5,15 @@ from __future__ import annotations
 import logging
 import os
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from app.jobs import Check, checker
+from app.kept import KeptMatches, ResultStore
 from app.matching import Settings
 from app.modes import parameters_in
-from app.pairs import are_neighbours
 from segmap.errors import CancelledError, SegmapError
 from segmap.events import IntegrationId, Proposal
 from segmap.graph import Residual
@@ -22,18 +22,19 @@ from segmap.links import Link
 from segmap.mapping import WholeMap, map_scans
 from segmap.parameters import Parameters
 from segmap.project import ProjectState
+from segmap.revisits import Proposed, Revisit, neighbours, proposed
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
-from segmap.spreading import Pair
+from segmap.spreading import Told, spread
 
-__all__ = ["SEARCH", "WORKERS", "Closure", "Found", "LoopSearch", "Searching", "find_closures"]
+__all__ = ["SEARCH", "WORKERS", "Closure", "Found", "LoopSearch", "Searching", "find_closures", "new_proposals"]
 
 MODE = "verified"
 """the mode in which whole logs are searched, whatever that of the project"""
-CLOSING = ("closed", "joined", "voted")
-"""what links are that bring something beyond the neighbours of each log"""
 SEARCH = "loop search"
 """who proposes"""
+TIES = f"{SEARCH}, as it ties what nothing else ties"
+"""of a pair that is no revisit"""
 WORKERS = max(1, min(4, os.cpu_count() or 1))
 """processes"""
 STEPS = 50
@@ -42,17 +43,18 @@ JOIN_SECONDS = 3.0
 log = logging.getLogger(__name__)
 
 Extractor = Callable[[ScanId, Parameters], SegmentMap]
-Told = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """A pair beyond neighbours that the search takes for true."""
+    """A pair that the search takes for true, and that a person is asked about."""
 
     link: Link
     match: Match
     residual: Residual
     """in the graph of the whole map the search made"""
+    why: str
+    """for people: what it stands for"""
 
     @property
     def integration(self) -> str:
@@ -69,7 +71,7 @@ class Closure:
         """What is put into the project."""
         link = self.link
         return Proposal(
-            integration=self.integration, kind="closure", T_1_2=link.T_1_2, covariance=link.covariance, source=SEARCH
+            integration=self.integration, kind="closure", T_1_2=link.T_1_2, covariance=link.covariance, source=self.why
         )
 
 
@@ -78,20 +80,32 @@ class Found:
     """What a search found."""
 
     closures: tuple[Closure, ...]
-    """the surest first"""
-    matches: Mapping[str, Match]
-    """of every pair that was matched, by name"""
-    settings: Settings
-    """under which"""
-    heuristic: str = DEFAULT_HEURISTIC[MODE]
+    """those to be asked about, the surest first"""
+    revisits: int = 0
+    """times that a robot comes back past a place, or another one comes past"""
+    others: int = 0
+    """closures that say the same as one of those"""
+    silenced: int = 0
+    """closures that the others contradict"""
 
     def in_words(self, new: int) -> str:
         """What came of it, where so many of the closures were not in the queue before."""
         count = len(self.closures)
         if not count:
             return "No loop closure was found."
-        told = "1 loop closure was found" if count == 1 else f"{count} loop closures were found"
-        return f"{told}; {new} {'is' if new == 1 else 'are'} new in the queue."
+        told = "1 loop closure is proposed" if count == 1 else f"{count} loop closures are proposed"
+        said = [
+            f"{told}, for {_counted(self.revisits, 'revisit')}; {new} {'is' if new == 1 else 'are'} new in the queue."
+        ]
+        if self.others:
+            said.append(f"{_counted(self.others, 'more pair')} say the same and are left out.")
+        if self.silenced:
+            said.append(f"{_counted(self.silenced, 'pair')} that the others contradict: left out, too.")
+        return " ".join(said)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count:,} {what}{'' if count == 1 else 's'}"
 
 
 def find_closures(
@@ -99,37 +113,96 @@ def find_closures(
     scan_ids: Iterable[ScanId],
     extractor: Extractor,
     *,
+    store: ResultStore | None = None,
     workers: int = WORKERS,
+    backend: str = "processes",
+    every: bool = False,
     progress: Told | None = None,
     check: Check | None = None,
 ) -> Found:
     """Search all logs of a project for closures; nothing is decided.
 
+    Each match is kept in ``store`` as it is found and taken from there, so that a search that was stopped, or
+    killed, goes on where it was. A few closures of each revisit are found worth asking about, or ``every`` one.
+
     Raises:
         CancelledError: raised by ``check``.
     """
     settings = Settings(parameters_in(MODE, state), MODE)
-    scans = list(scan_ids)
+    maps = _extracted(list(scan_ids), extractor, settings.parameters, progress or _nobody, check)
+    kept = None if store is None else KeptMatches(store, settings.key(DEFAULT_HEURISTIC[MODE]))
+    keep, told = None if kept is None else kept.keep, progress or _nobody
+    whole = map_scans(
+        maps,
+        settings.searched,
+        workers=workers,
+        backend=backend,
+        known=kept,
+        keep=keep,
+        progress=progress,
+        check=check,
+    )
+    beside = spread(
+        maps,
+        neighbours(whole.scans),
+        settings.searched,
+        workers=workers,
+        backend=backend,
+        known=whole.matches if kept is None else kept,
+        keep=keep,
+        progress=lambda done, total: told("matching neighbours", done, total),
+        check=check,
+    )
+    return _found(whole, proposed(whole, dict(beside)), every)
+
+
+def _nobody(what: str, done: int, total: int) -> None:
+    """Nobody listens."""
+
+
+def _extracted(
+    scans: Sequence[ScanId], extractor: Extractor, parameters: Parameters, told: Told, check: Check | None
+) -> dict[ScanId, SegmentMap]:
     maps: dict[ScanId, SegmentMap] = {}
     for scan in scans:
         if check is not None:
             check()
-        maps[scan] = extractor(scan, settings.parameters)
-        if progress is not None:
-            progress("extracting segments", len(maps), len(scans))
-    whole = map_scans(maps, settings.searched, workers=workers, progress=progress, check=check)
-    closures = sorted(_closures(whole), key=lambda c: (-c.link.confidence, c.link.pair))
-    return Found(tuple(closures), {_name(pair): match for pair, match in whole.matches.items()}, settings)
+        maps[scan] = extractor(scan, parameters)
+        told("extracting segments", len(maps), len(scans))
+    return maps
 
 
-def _closures(whole: WholeMap) -> Iterator[Closure]:
-    for link, residual in zip(whole.links, whole.optimised.residuals, strict=True):
-        if link.why in CLOSING and link.pair in whole.matches and not are_neighbours(*link.pair):
-            yield Closure(link, whole.matches[link.pair], residual)
+def _found(whole: WholeMap, asked: Proposed, every: bool) -> Found:
+    fates = {link.pair: fate for link, fate in zip(whole.links, whole.optimised.residuals, strict=True)}
+    closures = [
+        Closure(link, whole.matches[link.pair], fates[link.pair], _of_revisit(revisit))
+        for revisit in asked.revisits
+        for link in (revisit.closures if every else revisit.chosen)
+    ]
+    closures += [Closure(link, whole.matches[link.pair], fates[link.pair], TIES) for link in asked.ties]
+    once = {closure.integration: closure for closure in closures}  # what ties may be of a revisit, too
+    return Found(
+        tuple(sorted(once.values(), key=lambda c: (-c.link.confidence, c.link.pair))),
+        len(asked.revisits),
+        0 if every else asked.others,
+        len(asked.silenced),
+    )
 
 
-def _name(pair: Pair) -> str:
-    return str(IntegrationId(*pair))
+def new_proposals(found: Found, state: ProjectState) -> tuple[Proposal, ...]:
+    """What a search found that nobody has decided on, and the queue has not like this; what others claim stays."""
+    return tuple(c.proposal for c in found.closures if _is_new(c.proposal, state))
+
+
+def _is_new(proposal: Proposal, state: ProjectState) -> bool:
+    held = state.proposals.get(proposal.integration)
+    free = held is None or (held.kind == "closure" and held != proposal)
+    return free and proposal.integration not in state.decisions
+
+
+def _of_revisit(revisit: Revisit) -> str:
+    count = len(revisit.closures)
+    return f"{SEARCH}, 1 of {count} pairs that say the same" if count > 1 else SEARCH
 
 
 # --- in the background ----------------------------------------------------------------------------
@@ -175,7 +248,7 @@ class LoopSearch:
         self._changed()
 
     def cancel(self) -> None:
-        """Stop the search; nothing is proposed by it."""
+        """Stop the search; nothing is proposed by it, and what it matched is kept."""
         with self._lock:
             if not self.progress.running:
                 return
@@ -199,7 +272,7 @@ class LoopSearch:
         try:
             message = self._search(self._told, checker(self._stop))
         except CancelledError:
-            message = "The search for loop closures was stopped; nothing was proposed."
+            message = "The search for loop closures was stopped. What it matched is kept: search again to go on there."
         except SegmapError as error:
             message = f"The search for loop closures failed: {error}"
         except BrokenProcessPool:

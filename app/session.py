@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import Any
 
 from app.changes import Change, changed, events_of, is_accepted, settings_of
-from app.claims import with_claim
+from app.claims import suggested_rank, with_claim
 from app.creation import Filled, Source, put_in, read_sources
 from app.criterion import CRITERIA, Criterion
 from app.deciding import choose
@@ -23,7 +23,7 @@ from app.pairs import integrations_of
 from app.posegraph import Solver, graph_of
 from app.reporting import Reporter
 from app.review import Flips, Outcome, Row, Rows, counts, flips, queue
-from app.searching import SEARCH, WORKERS, Found
+from app.searching import SEARCH, WORKERS, Found, new_proposals
 from app.steps import Steps
 from segmap.errors import SegmapError
 from segmap.events import Choice, Event, IntegrationId
@@ -78,6 +78,7 @@ class Session(Steps):
         self._reporter = Reporter(self._inputs.segment_map, self._matching.outcome, self._inputs.facts)
         self.loops = Loops(
             self,
+            store,
             solve=solve,
             prepare=self._prepare,
             take=self._take_closures,
@@ -192,6 +193,10 @@ class Session(Steps):
         """Go on with matching."""
         self._matching.resume()
 
+    def suggested(self, integration: str, heuristic: str | None = None) -> int:
+        """The rank of the candidate to begin with: where our own search says that the scans lie, else the best."""
+        return suggested_rank(self._state.proposals.get(integration), lambda: self.match(integration, heuristic))
+
     # --- the review queue -------------------------------------------------------------------------
 
     def row(self, integration: str) -> Row:
@@ -299,7 +304,8 @@ class Session(Steps):
     def _heuristic(self, name: str | None) -> str:
         return self._state.heuristic if name is None else chosen_heuristic(self._state.mode, name)
 
-    def _choice(self, integration: str, verdict: str, heuristic: str, rank: int) -> Choice:
+    def _choice(self, integration: str, verdict: str, heuristic: str, rank: int | None) -> Choice:
+        rank = self.suggested(integration, heuristic) if rank is None else rank
         outcome = self.outcome(self._checked(integration), heuristic)
         match = self.match(integration, heuristic) if rank or outcome is None or outcome.pose is None else None
         return choose(integration, verdict, heuristic, self._state, outcome, match, rank)
@@ -385,12 +391,8 @@ class Session(Steps):
         self._tell({"type": "graph", "revision": self.loops.graph.revision})
 
     def _take_closures(self, found: Found) -> str:
-        """Keep what a search matched, and propose what it found and the queue has not yet."""
-        proposals = [closure.proposal for closure in found.closures]
-        wanted = {*self._integrations, *(proposal.integration for proposal in proposals)}
-        self._matching.keep({id: m for id, m in found.matches.items() if id in wanted}, found.settings, found.heuristic)
-        change = self.propose(proposals, who=SEARCH, again=False)
-        return found.in_words(len(change.integrations))
+        """Propose what a search found."""
+        return found.in_words(len(self.propose(new_proposals(found, self._state), who=SEARCH).integrations))
 
     def _progressed(self) -> None:
         self._tell({"type": "progress", **self.progress.to_json()})

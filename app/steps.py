@@ -41,7 +41,7 @@ class Steps(ABC):
     def _commit(self, event: Event, expected_revision: int | None = None) -> Change: ...
 
     @abstractmethod
-    def _choice(self, integration: str, verdict: str, heuristic: str, rank: int) -> Choice: ...
+    def _choice(self, integration: str, verdict: str, heuristic: str, rank: int | None) -> Choice: ...
 
     @abstractmethod
     def _heuristic(self, name: str | None) -> str: ...
@@ -62,16 +62,16 @@ class Steps(ABC):
     ) -> Change:
         """Accept or reject integrations in one step; what is decided so already stays as it is.
 
-        ``candidate`` is a rank among the match's candidates, default the best.
+        ``candidate`` is a rank among the match's candidates, default the best, or the one our own search proposes.
 
         Raises:
             UnknownError: there is no such integration or candidate.
             ProjectError: an integration to be accepted has no transformation (yet).
             ConflictError: one was decided by somebody after ``expected_revision``.
         """
-        rank, name = candidate or 0, self._heuristic(heuristic)
+        name = self._heuristic(heuristic)
         with self._lock:
-            choices = [self._choice(id, verdict, name, rank) for id in dict.fromkeys(integrations)]
+            choices = [self._choice(id, verdict, name, candidate) for id in dict.fromkeys(integrations)]
             new = tuple(choice for choice in choices if not in_force(choice, self._state))
             if not new:
                 return Change(self._state)

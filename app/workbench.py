@@ -92,7 +92,7 @@ class View:
     # --- choosing what to look at -----------------------------------------------------------------
 
     def select(self, integration: str) -> None:
-        """Look at an integration: at the candidate that was decided on, or else at the best.
+        """Look at an integration: at the candidate that was decided on, or our own search proposes, or else the best.
 
         Raises:
             UnknownError: the project has no such integration.
@@ -105,7 +105,8 @@ class View:
             raise UnknownError(f"The project has no integration {integration[:80]!r}.")
         decision = self.session.state.decisions.get(integration)
         heuristic = decision.heuristic if decision and decision.heuristic in self._heuristics else None
-        rank = self._rank_of(integration, heuristic, decision) if decision else 0
+        suggested = self.session.suggested
+        rank = self._rank_of(integration, heuristic, decision) if decision else suggested(integration, heuristic)
         return replace(self._looks.at(integration, heuristic, rank), notice=notice)
 
     def _rank_of(self, integration: str, heuristic: str | None, decision: Decision) -> int:

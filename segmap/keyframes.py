@@ -6,11 +6,11 @@ fails, and half-way between two such failures another keyframe is put, so that e
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from segmap.consensus import Consensus, voted
 from segmap.integration import Match, Verdict, match_maps
@@ -28,7 +28,7 @@ from segmap.parameters import Parameters
 from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
-from segmap.spreading import Matches, Pair, spread
+from segmap.spreading import Crew, Matches, Pair
 from segmap.visibility import Sighting, sighting, thinned
 
 __all__ = ["Chain", "chained", "keyframes", "windows"]
@@ -64,40 +64,18 @@ class Chain:
     """of the log"""
 
 
-def chained(
-    maps: Mapping[ScanId, SegmentMap],
-    sequence: Sequence[ScanId],
-    parameters: Parameters,
-    *,
-    workers: int = 1,
-    progress: Callable[[str, int, int], None] | None = None,
-    check: Callable[[], None] | None = None,
-) -> Chain:
+def chained(crew: Crew, sequence: Sequence[ScanId]) -> Chain:
     """The chain of a log: keyframes, their links, and the other scans tracked from them."""
-    told = progress or _nobody
-    firm, tracked, matches = _tracked(maps, sequence, parameters, workers, told, check)
+    firm, tracked, matches = _tracked(crew, sequence)
     keys = keyframes(sequence, firm)
     tracked = {scan: link for scan, link in tracked.items() if scan not in set(keys)}
     pairs = [pair for pair in windows(keys) if pair not in matches]
-    matches.update(
-        spread(
-            maps,
-            pairs,
-            parameters,
-            workers=workers,
-            progress=lambda i, n: told("matching keyframes", i, n),
-            check=check,
-        )
-    )
+    matches.update(crew.matches(pairs, "matching keyframes"))
     among = {pair: matches[pair] for pair in windows(keys)}
     pace = pace_of(matches)
     links = agreed(keys, among, pace)
-    _bridge(maps, keys, links, matches, pace, parameters, workers, check)
+    _bridge(crew, keys, links, matches, pace)
     return Chain(tuple(keys), links, tracked, matches, pace)
-
-
-def _nobody(what: str, done: int, total: int) -> None:
-    """Nobody listens."""
 
 
 def windows(keys: Sequence[ScanId], width: int = WINDOW) -> Iterator[Pair]:
@@ -120,43 +98,49 @@ def keyframes(sequence: Sequence[ScanId], firm: Sequence[ScanId]) -> list[ScanId
     return list(sequence) if len(kept) > SPARSE * len(sequence) else [sequence[i] for i in kept]
 
 
-def _tracked(
-    maps: Mapping[ScanId, SegmentMap],
-    sequence: Sequence[ScanId],
-    parameters: Parameters,
-    workers: int,
-    told: Callable[[str, int, int], None],
-    check: Callable[[], None] | None,
-) -> tuple[list[ScanId], dict[ScanId, Link], Matches]:
+def _tracked(crew: Crew, sequence: Sequence[ScanId]) -> tuple[list[ScanId], dict[ScanId, Link], Matches]:
     """The scans others are tracked from, and every other one from the last of them."""
     stretches = [sequence[i : i + STRETCH] for i in range(0, len(sequence), STRETCH)]
     firm: list[ScanId] = []
     tracked: dict[ScanId, Link] = {}
     matches: Matches = {}
-    tasks = (delayed(_track)({scan: maps[scan] for scan in part}, part, parameters) for part in stretches)
-    results = Parallel(n_jobs=workers, return_as="generator", batch_size=1)(tasks)
-    for done, (keys, links, found) in enumerate(results, start=1):
-        if check is not None:
-            check()
+    known = _by_stretch(crew.known, sequence)
+    tasks = (
+        delayed(_track)({scan: crew.maps[scan] for scan in part}, part, crew.parameters, known.get(number, {}))
+        for number, part in enumerate(stretches)
+    )
+    for done, (keys, links, found) in enumerate(crew.tasks(tasks), start=1):
         firm.extend(keys)
         tracked.update(links)
         matches.update(found)
-        told("tracking", min(done * STRETCH, len(sequence)), len(sequence))
+        crew.new(found)
+        crew.told("tracking", min(done * STRETCH, len(sequence)), len(sequence))
     return firm, tracked, matches
 
 
+def _by_stretch(known: Mapping[Pair, Match], sequence: Sequence[ScanId]) -> dict[int, Matches]:
+    """What is known of the pairs within each stretch."""
+    number = {scan: place // STRETCH for place, scan in enumerate(sequence)}
+    found: dict[int, Matches] = {}
+    for pair in known:
+        a, b = (number.get(scan) for scan in pair)
+        if a is not None and a == b:
+            found.setdefault(a, {})[pair] = known[pair]
+    return found
+
+
 def _track(
-    maps: Mapping[ScanId, SegmentMap], part: Sequence[ScanId], parameters: Parameters
+    maps: Mapping[ScanId, SegmentMap], part: Sequence[ScanId], parameters: Parameters, known: Mapping[Pair, Match]
 ) -> tuple[list[ScanId], dict[ScanId, Link], Matches]:
     links: dict[ScanId, Link] = {}
     matches: Matches = {}
     keys, key = [part[0]], 0
     for i in range(1, len(part)):
-        found = _sure(maps, part, key, i, parameters, matches)
+        found = _sure(maps, (part[key], part[i]), parameters, known, matches)
         if found is None and i - 1 > key:
             key = i - 1
             keys.append(part[key])
-            found = _sure(maps, part, key, i, parameters, matches)
+            found = _sure(maps, (part[key], part[i]), parameters, known, matches)
         if found is None:
             key = i
             keys.append(part[key])
@@ -166,15 +150,9 @@ def _track(
 
 
 def _sure(
-    maps: Mapping[ScanId, SegmentMap],
-    part: Sequence[ScanId],
-    key: int,
-    i: int,
-    parameters: Parameters,
-    matches: Matches,
+    maps: Mapping[ScanId, SegmentMap], pair: Pair, parameters: Parameters, known: Mapping[Pair, Match], matches: Matches
 ) -> Link | None:
-    pair = part[key], part[i]
-    match: Match = match_maps(maps[pair[0]], maps[pair[1]], parameters, mode="verified")
+    match = known.get(pair) or match_maps(maps[pair[0]], maps[pair[1]], parameters, mode="verified")
     matches[pair] = match
     return Link.of(pair, match, 0, "accepted") if match.verdict is Verdict.ACCEPTED else None
 
@@ -182,16 +160,7 @@ def _sure(
 # --- gaps -----------------------------------------------------------------------------------------
 
 
-def _bridge(
-    maps: Mapping[ScanId, SegmentMap],
-    keys: Sequence[ScanId],
-    links: dict[Pair, Link],
-    matches: Matches,
-    pace: Pace,
-    parameters: Parameters,
-    workers: int,
-    check: Callable[[], None] | None,
-) -> None:
+def _bridge(crew: Crew, keys: Sequence[ScanId], links: dict[Pair, Link], matches: Matches, pace: Pace) -> None:
     """Let the scans on both sides of each gap, and of each step that hangs on little, vote on the step."""
     place = {key: i for i, key in enumerate(keys)}
     for i in range(1, len(keys)):
@@ -202,8 +171,8 @@ def _bridge(
         before = placed_from(keys[i - 1], near, keys[max(0, i - SIDE) : i])
         after = placed_from(keys[i], near, keys[i : i + SIDE])
         pairs = [(a, b) for a in before for b in after if (a, b) not in matches]
-        matches.update(spread(maps, pairs, parameters, workers=workers, check=check))
-        consensus = _across(maps, keys[i - 1 : i + 1], before, after, matches, pace, parameters)
+        matches.update(crew.matches(pairs, "bridging gaps"))
+        consensus = _across(crew.maps, keys[i - 1 : i + 1], before, after, matches, pace, crew.parameters)
         for link in across:
             del links[link.pair]
         for vote in consensus.votes if consensus else ():

@@ -11,6 +11,7 @@ import numpy as np
 from segmap.fusion import fuse_all
 from segmap.graph import Optimised, components, optimise
 from segmap.graph.edges import Parts
+from segmap.integration import Match
 from segmap.keyframes import chained
 from segmap.links import Link, Pace
 from segmap.loops import (
@@ -30,7 +31,7 @@ from segmap.parameters import Parameters
 from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
-from segmap.spreading import Matches, Pair, spread
+from segmap.spreading import Crew, Keep, Matches, Pair, Told
 
 __all__ = ["WholeMap", "fused", "map_scans"]
 
@@ -97,31 +98,31 @@ def _blocks(parts: Sequence[Sequence[ScanId]], wholes: Sequence[Sequence[ScanId]
     return blocks
 
 
-Told = Callable[[str, int, int], None]
-
-
 def map_scans(
     maps: Mapping[ScanId, SegmentMap],
     parameters: Parameters,
     *,
     workers: int = 1,
+    backend: str = "processes",
+    known: Mapping[Pair, Match] | None = None,
+    keep: Keep | None = None,
     progress: Told | None = None,
     check: Callable[[], None] | None = None,
 ) -> WholeMap:
     """Where the scans of one log or several are, each log in the order it was taken.
 
-    Nothing but the scans is used. ``progress`` is told what is done, how much of it and of how much.
+    Nothing but the scans is used. ``progress`` is told what is done, how much of it and of how much. ``keep``
+    is given each match that is not ``known``, some at a time: with what was kept until it was stopped the work
+    goes on where it was, to the same result as if it had never been.
 
     Raises:
         CancelledError: raised by ``check``.
+        ParameterError: there is no such backend.
     """
     told: Told = progress or _nobody
-    chains = [
-        chained(maps, list(log), parameters, workers=workers, progress=told, check=check)
-        for _, log in groupby(sorted(maps), key=lambda scan: scan.log)
-    ]
-    paces = {chain.keys[0].log: chain.pace for chain in chains}
-    task = _Task(maps, parameters, workers, told, check, paces)
+    crew = Crew(maps, parameters, workers, backend, known or {}, keep, told, check)
+    chains = [chained(crew, list(log)) for _, log in groupby(sorted(maps), key=lambda scan: scan.log)]
+    task = _Task(crew, {chain.keys[0].log: chain.pace for chain in chains})
     keys = sorted(key for chain in chains for key in chain.keys)
     links = {pair: link for chain in chains for pair, link in chain.links.items()}
     matches = {pair: match for chain in chains for pair, match in chain.matches.items()}
@@ -146,35 +147,17 @@ def fused(whole: WholeMap, maps: Mapping[ScanId, SegmentMap], parameters: Parame
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    maps: Mapping[ScanId, SegmentMap]
-    parameters: Parameters
-    workers: int
-    told: Told
-    check: Callable[[], None] | None
+    crew: Crew
     paces: Mapping[int, Pace]
-
-    def spread(self, pairs: Sequence[Pair], what: str) -> Matches:
-        """The matches of some pairs."""
-        told = self.told
-        return dict(
-            spread(
-                self.maps,
-                pairs,
-                self.parameters,
-                workers=self.workers,
-                progress=lambda done, total: told(what, done, total),
-                check=self.check,
-            )
-        )
 
 
 def _close_loops(task: _Task, keys: Sequence[ScanId], links: dict[Pair, Link], matches: Matches) -> None:
     """Search for closures within and between components until no more is found; ``links`` and ``matches`` grow."""
-    scene = Scene(task.maps, keys, task.parameters)
-    optimised = optimise([link.edge for link in links.values()], check=task.check)
+    scene = Scene(task.crew.maps, keys, task.crew.parameters)
+    optimised = optimise([link.edge for link in links.values()], check=task.crew.check)
     for turn in range(ROUNDS):
         promises = promising(scene, optimised.poses, optimised.components, _sound(optimised, links), set(matches))
-        found = task.spread([promise.pair for promise in promises], f"closing loops, round {turn + 1}")
+        found = task.crew.matches([promise.pair for promise in promises], f"closing loops, round {turn + 1}")
         matches.update(found)
         closures = [link for promise in promises if (link := closure(promise, found[promise.pair]))]
         links.update((link.pair, link) for link in closures)
@@ -182,7 +165,7 @@ def _close_loops(task: _Task, keys: Sequence[ScanId], links: dict[Pair, Link], m
         links.update((link.pair, link) for link in joined)
         if not closures and not joined:
             break
-        optimised = optimise([link.edge for link in links.values()], check=task.check)
+        optimised = optimise([link.edge for link in links.values()], check=task.crew.check)
 
 
 def _sound(optimised: Optimised, links: Mapping[Pair, Link]) -> list[Link]:
@@ -219,7 +202,7 @@ def _joined(
     other: Sequence[ScanId],
     matches: Matches,
 ) -> list[Link]:
-    waiting = [pair for pair in _across(task.maps, part, other) if pair not in matches]
+    waiting = [pair for pair in _across(task.crew.maps, part, other) if pair not in matches]
     asked: list[Pose2] = []
     while True:
         for T_1_2 in proposals(poses, part, other, matches):
@@ -229,13 +212,13 @@ def _joined(
                     continue
                 promises = across(scene, poses, part, other, T_1_2)
                 new = [promise.pair for promise in promises if promise.pair not in matches]
-                matches.update(task.spread(new, "joining components"))
+                matches.update(task.crew.matches(new, "joining components"))
                 links = borne_out(promises, matches)
                 if links and agreement(scene, poses, part, other, T_1_2) >= LEAST_AGREEMENT:
                     return links
         if not waiting:
             return []
-        matches.update(task.spread(waiting[:BATCH], "joining components"))
+        matches.update(task.crew.matches(waiting[:BATCH], "joining components"))
         del waiting[:BATCH]
 
 

@@ -283,6 +283,14 @@ class Store:
             found.update({wanted[key]: text for key, value in rows if (text := _expanded(value)) is not None})
         return found
 
+    def result_keys(self, prefix: str) -> list[str]:
+        """The keys of all results that are kept and begin so, the oldest first."""
+        start, own = _cache_key(prefix), len(_cache_key(""))
+        query = "SELECT key FROM results WHERE substr(key, 1, ?) = ? ORDER BY number"
+        with self._reading() as connection:
+            rows = connection.execute(query, (len(start), start)).fetchall()
+        return [key[own:] for (key,) in rows]
+
     def drop_results(self) -> None:
         """Forget all results."""
         with self._writing() as connection:

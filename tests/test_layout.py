@@ -56,6 +56,7 @@ ORDER = (
     "keyframes",
     "loops",
     "mapping",
+    "revisits",
     "events",
     "project",
     "_database",

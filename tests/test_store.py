@@ -291,6 +291,13 @@ def test_many_results_are_read_at_once(store: Store) -> None:
     assert store.results(()) == {}
 
 
+def test_results_are_listed_by_how_their_keys_begin(store: Store) -> None:
+    """Nothing that stands for anything, such as a percent sign, is taken for more than itself."""
+    store.put_results({"match/a%/2": "", "match/a%/1": "", "match/ab/1": "", "other": ""})
+    assert store.result_keys("match/a%/") == ["match/a%/2", "match/a%/1"]
+    assert len(store.result_keys("")) == 4
+
+
 def test_results_stay_within_their_room(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """Over the limit the oldest results go, and never the history."""
     monkeypatch.setattr(store_module, "RESULTS_LIMIT", 2000)

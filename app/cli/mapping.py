@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
-from app.cli.options import Json, Logs, Out, Preset, Setting, Trajectory, method_of, read_all
+from app.cli.clusters import cluster
+from app.cli.options import Dask, Json, Logs, Out, Preset, Setting, Trajectory, Workers, method_of, read_all
 from app.cli.output import print_json, print_table, progress
 from app.cli.writing import described, listed, times_of, write_trajectory
 from segmap.export import Content, by_suffix, write_files
@@ -18,14 +19,13 @@ from segmap.segments import extract
 
 __all__ = ["map_logs"]
 
-Workers = Annotated[int, typer.Option(min=1, max=256, help="Processes that match scans.")]
-
 
 def map_logs(
     logs: Logs,
     out: Out = None,
     trajectory: Trajectory = None,
     workers: Workers = 2,
+    dask: Dask = None,
     preset: Preset = None,
     settings: Setting = None,
     as_json: Json = False,
@@ -44,8 +44,14 @@ def map_logs(
         for number, log in enumerate(laser_logs)
         for index, scan in enumerate(log)
     }
-    with progress("mapping") as tell:
-        whole = map_scans(maps, by.parameters, workers=workers, progress=lambda _, done, total: tell(done, total))
+    with cluster(dask) as backend, progress("mapping") as tell:
+        whole = map_scans(
+            maps,
+            by.parameters,
+            workers=workers,
+            backend=backend,
+            progress=lambda _, done, total: tell(done, total),
+        )
     parts = fused(whole, maps, by.parameters)
     title = ", ".join(log.name for log in laser_logs)
     about = described(title, map_hash(parts))

@@ -21,6 +21,7 @@ from segmap.segments import SegmentMap, extract
 
 __all__ = [
     "DEFAULT_MODE",
+    "Dask",
     "Explain",
     "Heuristic",
     "Json",
@@ -34,6 +35,7 @@ __all__ = [
     "PriorDeviations",
     "Setting",
     "Trajectory",
+    "Workers",
     "method_of",
     "one_of",
     "open_log",
@@ -110,6 +112,13 @@ PriorDeviations: TypeAlias = Annotated[
 Setting: TypeAlias = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Change a parameter; can be given several times."),
+]
+
+
+Workers: TypeAlias = Annotated[int, typer.Option(min=1, max=256, help="Processes that match scans.")]
+Dask: TypeAlias = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Match on the Dask cluster of this scheduler, such as tcp://host:8786."),
 ]
 
 

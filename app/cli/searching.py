@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 import typer
 
-from app.cli.options import Json
+from app.cli.clusters import cluster
+from app.cli.options import Dask, Json, Workers
 from app.cli.output import pose_json, print_json, print_table, progress
 from app.inputs import Inputs
-from app.pairs import integrations_of
-from app.searching import SEARCH, WORKERS, Closure, Found, find_closures
+from app.searching import SEARCH, WORKERS, Closure, Found, find_closures, new_proposals
 from segmap.errors import ProjectError
 from segmap.events import Propose
 from segmap.store import Store
@@ -20,16 +20,25 @@ from segmap.store import Store
 __all__ = ["loops"]
 
 Project = Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file, .segmap.", show_default=False)]
-Workers = Annotated[int, typer.Option(min=1, help="Processes that match.")]
 Keep = Annotated[bool, typer.Option("--keep/--no-keep", help="Put what is found into the review queue of the project.")]
+Every = Annotated[bool, typer.Option("--all", help="Every closure, not only a few of each revisit.")]
 
 
-def loops(project: Project, workers: Workers = WORKERS, keep: Keep = True, as_json: Json = False) -> None:
+def loops(
+    project: Project,
+    workers: Workers = WORKERS,
+    dask: Dask = None,
+    keep: Keep = True,
+    every: Every = False,
+    as_json: Json = False,
+) -> None:
     """Search all logs of a project for loop closures, without odometry; nothing is accepted without a person.
 
-    The residual is how far each is from where all links of the search together have it.
+    Of each revisit a few closures are proposed, and what ties what nothing else ties. The residual is how far each is
+    from where all links of the search together have it. What is matched is kept in the project: a search that was
+    interrupted goes on where it was.
     """
-    with Store.open(project) as store:
+    with cluster(dask) as backend, Store.open(project) as store:
         inputs = Inputs(store, store.state.logs, store.log_bytes)
         if len(inputs.scan_ids) < 2:
             raise ProjectError(f"{project} has fewer than two scans: there is nothing to search.")
@@ -38,27 +47,24 @@ def loops(project: Project, workers: Workers = WORKERS, keep: Keep = True, as_js
                 store.state,
                 inputs.scan_ids,
                 inputs.segment_map,
+                store=store if keep else None,
                 workers=workers,
+                backend=backend,
+                every=every,
                 progress=lambda _, done, total: tell(done, total),
             )
-        new = _new(store, inputs, found)
+        new = new_proposals(found, store.state)
         if keep and new:
-            event = Propose(proposals=tuple(closure.proposal for closure in new), who=SEARCH)
-            store.append(event)
+            store.append(Propose(proposals=new, who=SEARCH))
         _report(store, found, len(new), as_json)
-
-
-def _new(store: Store, inputs: Inputs, found: Found) -> list[Closure]:
-    """Those the queue of the project has not yet."""
-    known = set(integrations_of(store.state, inputs.scan_ids))
-    return [closure for closure in found.closures if closure.integration not in known]
 
 
 def _report(store: Store, found: Found, new: int, as_json: bool) -> None:
     parameters = store.state.parameters
     rows = [_closure(closure, str(closure.match.judged(parameters).verdict)) for closure in found.closures]
     if as_json:
-        print_json({"closures": rows, "new": new, "revision": store.state.revision})
+        counts = {"revisits": found.revisits, "others": found.others, "silenced": found.silenced}
+        print_json({"closures": rows, "new": new, **counts, "revision": store.state.revision})
         return
     if rows:
         header = ("pair", "value [m]", "confidence", "residual", "verdict")
@@ -79,6 +85,7 @@ def _closure(closure: Closure, verdict: str) -> dict[str, Any]:
             "silenced": closure.residual.silenced,
         },
         "verdict": verdict,
+        "why": closure.why,
     }
 
 

@@ -15,10 +15,12 @@ from app.claims import CLAIMED
 from app.errors import UnknownError
 from app.graph_layers import TIES
 from app.resources import samples_folder
+from app.searching import find_closures
 from app.session import Session
 from app.workbench import View
-from segmap.errors import ProjectError
+from segmap.errors import CancelledError, ProjectError
 from segmap.events import Proposal
+from segmap.integration import match_maps
 from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.store import Store
@@ -260,7 +262,7 @@ def test_a_search_can_be_stopped(open_session: Open, monkeypatch: pytest.MonkeyP
     assert session.settle(PATIENCE)
     started: list[int] = []
 
-    def endless(maps: Any, parameters: Any, *, workers: int, progress: Any, check: Any) -> Any:
+    def endless(maps: Any, parameters: Any, *, workers: int, progress: Any, check: Any, **_: Any) -> Any:
         started.append(workers)
         progress("tracking", 1, 7)
         while True:
@@ -280,6 +282,55 @@ def test_a_search_can_be_stopped(open_session: Open, monkeypatch: pytest.MonkeyP
     session.loops.start()
     assert session.loops.settle(PATIENCE)
     assert session.state.proposals
+
+
+def test_a_search_that_was_stopped_goes_on_where_it_was(open_session: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What it matched is in the project file, also for another program; nothing of it is matched twice, and the
+    same is proposed as by a search that nobody stopped.
+    """
+    matched: list[int] = []
+    stop_at = 9
+
+    def counted(*maps: Any, **options: Any) -> Any:
+        if len(matched) == stop_at:
+            raise CancelledError("The work was stopped.")
+        matched.append(1)
+        return match_maps(*maps, **options)
+
+    for module in ("keyframes", "spreading"):
+        monkeypatch.setattr(f"segmap.{module}.match_maps", counted)
+    session = open_session(search_workers=1)
+    session.loops.start()
+    assert session.loops.settle(PATIENCE)
+    assert "What it matched is kept" in session.loops.progress.message
+    stop_at = -1
+    session = open_session(search_workers=1)
+    session.loops.start()
+    assert session.loops.settle(PATIENCE)
+    total = len(matched)
+    found = find_closures(session.state, session.scan_ids, session.extractor, workers=1)
+    assert len(matched) == 2 * total
+    assert session.state.proposals == {closure.integration: closure.proposal for closure in found.closures}
+
+
+def test_where_the_search_takes_another_candidate_that_one_is_decided_on(session: Session) -> None:
+    """It is shown first, accepted unless another is asked for, and left to a person."""
+    session.configure({}, mode="verified")
+    session.propose(manual(FAR))
+    assert session.settle(PATIENCE)
+    match = session.match(FAR)
+    assert match is not None
+    other = match.ranked[1].T_1_2
+    session.undo()
+    session.propose([Proposal(integration=FAR, kind="closure", T_1_2=other, source="loop search")])
+    assert session.settle(PATIENCE)
+    assert (session.row(FAR).verdict, session.row(FAR).above) == ("review", False)
+    view = View(session)
+    view.select(FAR)
+    assert view.snapshot()["candidate"] == session.suggested(FAR) == 1
+    view.close()
+    assert other == session.decide([FAR], "accepted").state.decisions[FAR].T_1_2
+    assert session.decide([FAR], "accepted", candidate=0).state.decisions[FAR].T_1_2 == match.T_1_2
 
 
 def test_a_search_that_fails_says_why(open_session: Open, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -374,7 +425,7 @@ def test_the_search_over_http(client: Any, project: str) -> None:
     assert any(row.kind == "closure" for row in session.rows())
     search = client.get(url).json()["search"]
     assert not search["running"]
-    assert "found" in search["message"]
+    assert "1 loop closure is proposed, for 1 revisit" in search["message"]
     assert client.post(f"{url}/loops", json={"action": "cancel"}).json() == search
     assert client.post(f"{url}/loops", json={"action": "dance"}).status_code == 422
 

@@ -47,7 +47,9 @@ def test_loops_are_found_told_and_kept(project: Path, capsys: pytest.CaptureFixt
     status, out, err = run(capsys, "loops", project, "--workers", 1, "--json")
     assert (status, err) == (0, "")
     told = json.loads(out)
-    assert told["new"] == len(told["closures"]) > 5
+    assert told["new"] == len(told["closures"]) > 2
+    assert told["others"] > 10 > told["revisits"] > 0
+    assert told["silenced"] == 0
     truth = [Pose2(*pose) for pose in poses()]
     for closure in told["closures"]:
         i, j = (int(scan.partition(".")[2]) for scan in closure["id"].split("-"))
@@ -61,7 +63,34 @@ def test_loops_are_found_told_and_kept(project: Path, capsys: pytest.CaptureFixt
     assert status == 0
     assert out.splitlines()[0].split() == ["pair", "value", "[m]", "confidence", "residual", "verdict"]
     assert len(out.splitlines()) == len(told["closures"]) + 2
-    assert out.splitlines()[-1].endswith("0 are new in the queue.")
+    assert "0 are new in the queue." in out.splitlines()[-1]
+
+
+def test_every_closure_can_be_had_and_from_a_cluster(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Not only a few of each revisit; the same whoever does the work. A scheduler that is not there is said."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(1, processes=False, dashboard_address=None) as cluster:
+        status, out, _ = run(capsys, "loops", project, "--dask", cluster.scheduler_address, "--all", "--json")
+    every = json.loads(out)
+    assert (status, every["others"]) == (0, 0)
+    status, out, _ = run(capsys, "loops", project, "--workers", 1, "--json")
+    few = json.loads(out)
+    assert len(few["closures"]) + few["others"] == len(every["closures"])
+    assert {one["id"] for one in few["closures"]} < {one["id"] for one in every["closures"]}
+    assert (few["new"], few["revisits"]) == (0, every["revisits"])
+
+
+@pytest.mark.parametrize("command", ["loops", "map"])
+def test_a_cluster_that_is_not_there_is_said(
+    project: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    """In one line, by both commands that can use one."""
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("app.cli.clusters.PATIENCE", "100ms")
+    given = project if command == "loops" else samples_folder() / "hall.log"
+    status, _, err = run(capsys, command, given, "--dask", "tcp://127.0.0.1:9")
+    assert status == 2
+    assert "no Dask scheduler at tcp://127.0.0.1:9" in err
 
 
 def poses() -> list[list[float]]:

@@ -36,7 +36,7 @@ def test_closures_are_found_accepted_and_seen_in_the_graph(
     menu(desk, "search")
     desk.page.locator("#searching").wait_for()
     desk.picture("loops-searching")
-    desk.page.get_by_text("loop closures were found").first.wait_for(timeout=120_000)
+    desk.page.get_by_text("loop closures are proposed").first.wait_for(timeout=120_000)
     desk.until(lambda: desk.count("loops") > 20, "the closures")
     server.wait_until_matched(project)
     desk.page.locator("[data-filter=loops]").click()

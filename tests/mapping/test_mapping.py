@@ -16,6 +16,7 @@ from segmap.parameters import preset
 from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import extract
+from segmap.spreading import Crew
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
 PARAMETERS = preset("verified")
@@ -60,7 +61,7 @@ def test_a_dense_log_needs_few_keyframes():
     """Fifty scans along a room; every one of them is where it should be."""
     places = [Pose2(1.8, 0.8 + 0.1 * i, 1.2 + 0.01 * i) for i in range(50)]
     maps = {ScanId(0, i): extract(noisy(other_room(), T, i), PARAMETERS, 0, i) for i, T in enumerate(places)}
-    chain = chained(maps, sorted(maps), PARAMETERS)
+    chain = chained(Crew(maps, PARAMETERS), sorted(maps))
     assert len(chain.keys) < 20
     assert set(chain.keys) | set(chain.tracked) == set(maps)
     whole = map_scans(maps, PARAMETERS)
@@ -109,6 +110,28 @@ def test_mapping_can_be_stopped():
 
     with pytest.raises(CancelledError):
         map_scans(maps, PARAMETERS, check=check)
+
+
+def test_mapping_that_was_stopped_goes_on_where_it_was():
+    """To the last bit as if it had not been, and no pair is matched twice."""
+    maps, _ = sample("office", "office.log")
+    few = {scan: maps[scan] for scan in sorted(maps)[:20]}
+    every, before, after = {}, {}, {}
+    whole = map_scans(few, PARAMETERS, keep=every.update)
+    assert every == whole.matches
+
+    def check():
+        if len(before) > len(every) / 2:
+            raise CancelledError("The work was stopped.")
+
+    with pytest.raises(CancelledError):
+        map_scans(few, PARAMETERS, keep=before.update, check=check)
+    assert len(every) / 2 < len(before) < len(every)
+    again = map_scans(few, PARAMETERS, known=before, keep=after.update)
+    assert set(before) | set(after) == set(every)
+    assert not set(before) & set(after)
+    assert again.poses == whole.poses
+    assert again.links == whole.links
 
 
 def test_an_empty_log_is_an_empty_map():

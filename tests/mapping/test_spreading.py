@@ -58,6 +58,28 @@ def test_it_can_be_stopped(maps, pairs, workers):
         list(going)
 
 
+@pytest.mark.parametrize("workers", [1, 2])
+def test_what_is_known_is_not_matched_again(maps, pairs, workers):
+    """What was kept until it was stopped is taken as it is, wherever it lies; the rest is kept, and all is the same."""
+    kept, rest = {}, {}
+    going = spread(maps, pairs, PARAMETERS, workers=workers, keep=kept.update)
+    for _ in range(BATCH + 2):
+        next(going)
+    going.close()
+    assert list(kept) == pairs[: len(kept)]
+    assert BATCH + 2 <= len(kept) < len(pairs) + (workers > 1)
+    del kept[pairs[3]]
+    told = []
+    every = spread(
+        maps, pairs, PARAMETERS, workers=workers, known=kept, keep=rest.update, progress=lambda *done: told.append(done)
+    )
+    found = dict(every)
+    assert list(found) == pairs
+    assert all(found[pair] is match for pair, match in kept.items())
+    assert set(rest) == set(pairs) - set(kept)
+    assert told[-1] == (len(pairs), len(pairs))
+
+
 def test_what_it_does_not_know_is_told(maps, pairs):
     """A backend that does not exist."""
     with pytest.raises(ParameterError, match="processes, dask"):
