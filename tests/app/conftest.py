@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -102,6 +103,22 @@ def log_bytes() -> bytes:
     lines = (samples_folder() / "hall.log").read_bytes().splitlines(keepends=True)
     header = [line for line in lines if not line.startswith(b"FLASER")]
     return b"".join(header + [line for line in lines if line.startswith(b"FLASER")][:7])
+
+
+@contextmanager
+def running(folder: Path) -> Iterator[Client]:
+    """A client of an app on a folder of projects, as long as it is needed."""
+    app = create_app(Workspace(folder), open_views=Views(without_scene))
+    with start_blocking_portal() as portal, portal.wrap_async_context_manager(app.router.lifespan_context(app)):
+        client = Client(app, portal)
+        yield client
+        client.close()
+
+
+@pytest.fixture(scope="session")
+def running_client() -> Callable[[Path], AbstractContextManager[Client]]:
+    """For tests that share an app."""
+    return running
 
 
 @pytest.fixture
