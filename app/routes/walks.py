@@ -12,8 +12,8 @@ from app.resources import static_folder
 from app.routes.common import Site
 from app.routes.projects import attached
 from app.walk_files import KINDS, MOST_FRAMES, walk_file
-from app.walks import STEPS, Asked, Subject, choices, document, stage_document, subject_of
-from segmap.walkthrough import PairWalk, Stage
+from app.walks import STEPS, Asked, Made, choices, document, stage_document
+from segmap.walkthrough import Stage
 
 __all__ = ["router"]
 
@@ -42,20 +42,20 @@ def walk_page() -> FileResponse:
 @router.get("/api/walk")
 def overview(site: Site, asked: Annotated[Asked, Query()]) -> dict[str, Any]:
     """A walkthrough without its steps: stages, lines of the algorithms, what its pictures share."""
-    subject, made = walked(site, asked)
+    subject, made = site.walks.get(asked, site.workspace)
     return document(made.walk, choices(subject))
 
 
 @router.get("/api/walk/stage")
 def stage(site: Site, asked: Annotated[AskedStage, Query()]) -> dict[str, Any]:
     """A stage that is made when somebody enters it, such as one candidate pair by pair."""
-    return stage_document(_stage(walked(site, asked)[1], asked.stage))
+    return stage_document(_stage(_made(site, asked), asked.stage))
 
 
 @router.get("/api/walk/steps")
 def steps(site: Site, asked: Annotated[AskedSteps, Query()]) -> dict[str, Any]:
     """Steps of a stage, any of them without those before."""
-    held = _stage(walked(site, asked)[1], asked.stage)
+    held = _stage(_made(site, asked), asked.stage)
     if asked.start >= held.count:
         raise UnknownError(f"The stage {held.id!r} has {held.count} steps; there is no step {asked.start}.")
     last = min(held.count, asked.start + asked.count)
@@ -73,19 +73,17 @@ def file(
     site: Site, kind: Annotated[str, Path(description=" or ".join(KINDS))], asked: Annotated[AskedFile, Query()]
 ) -> Response:
     """A walkthrough as one HTML file that plays offline, as numbered PNGs, or as an animated GIF."""
-    made = walked(site, asked)[1]
+    made = _made(site, asked)
     found = walk_file(made.walk, kind, asked.stage, asked.most)
     return Response(found.content, media_type=found.media_type, headers=attached(made.walk.title, found.suffix))
 
 
-def walked(site: Site, asked: Asked) -> tuple[Subject, PairWalk]:
-    """The walkthrough a request is about."""
-    subject = subject_of(asked, site.workspace)
-    key = (asked.project, asked.sample, subject.first, subject.second, subject.mode, subject.heuristic)
-    return subject, site.walks.walk(subject, (*key, subject.parameters))
+def _made(site: Site, asked: AskedStage) -> Made:
+    only = Asked(**{name: getattr(asked, name) for name in Asked.model_fields})
+    return site.walks.get(only, site.workspace)[1]
 
 
-def _stage(made: PairWalk, id: str) -> Stage:
+def _stage(made: Made, id: str) -> Stage:
     found = made.walk.stage(id)
     if found is None:
         raise UnknownError(f"This walkthrough has no stage {id!r}.")

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from segmap import tracing
 from segmap.graph.arrays import EdgeArrays, System, moved
 from segmap.pose import FloatArray, IntArray
 
@@ -33,11 +34,13 @@ class LeastSquares:
 
         Ends after ``steps`` steps, or one in which no pose moved to speak of.
         """
-        system, weights = self._laid_out(weights)
-        error, damping = float(weights @ system.edges.squares(poses)), 0.0
+        system, counting = self._laid_out(weights)
+        error, damping = float(counting @ system.edges.squares(poses)), 0.0
         for _ in range(steps):
             self._check()
-            poses, error, damping, moved_by = _stepped(system, poses, weights, error, damping)
+            before = poses
+            poses, error, damping, moved_by = _stepped(system, poses, counting, error, damping)
+            tracing.tell("stepped", before=before, poses=poses, weights=weights, error=error)
             if moved_by <= STILL:
                 break
         return poses

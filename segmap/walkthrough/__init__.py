@@ -10,19 +10,24 @@
 """
 
 from segmap.segments import SegmentMap
+from segmap.walkthrough.graphs import walk_graph
 from segmap.walkthrough.lines import ALGORITHMS
+from segmap.walkthrough.merges import MergeWalk, walk_merge
 from segmap.walkthrough.pairs import PairWalk, walk_maps, walk_scans
 from segmap.walkthrough.steps import Mark, Shape, Stage, Step, Walkthrough
 
 __all__ = [
     "ALGORITHMS",
     "Mark",
+    "MergeWalk",
     "PairWalk",
     "SegmentMap",
     "Shape",
     "Stage",
     "Step",
     "Walkthrough",
+    "walk_graph",
     "walk_maps",
+    "walk_merge",
     "walk_scans",
 ]

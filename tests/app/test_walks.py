@@ -115,3 +115,32 @@ def test_command(run, tmp_path):
     assert "Hall" in out.read_text() or "hall.log" in out.read_text()
     assert run("walkthrough", log, 0, 1, "--out", tmp_path / "hall.mp4")[0] == 2
     assert run("walkthrough", log, 0, 999, "--out", out)[0] == 2
+
+
+def test_a_merge_and_an_integration_of_it(client):
+    """A row of scans is merged by three methods; a step that was an integration can be gone into."""
+    merge = {"sample": "laboratory", "merge": "0.0-0.3", "mode": "verified"}
+    walk = client.get("/api/walk", params=merge).json()
+    assert [stage["id"] for stage in walk["stages"]] == ["sequential", "tree", "pivot", "comparison", "graph"]
+    tree = walk["stages"][1]
+    assert {"kind": "tree"}.items() <= tree["chart"].items()
+    asked = {**merge, "stage": "tree", "start": 0, "count": tree["count"]}
+    steps = client.get("/api/walk/steps", params=asked).json()["steps"]
+    node = steps[-1]["enter"]["node"]
+    inner = client.get("/api/walk", params={**merge, "node": node}).json()
+    assert {"chains", "result"} <= {stage["id"] for stage in inner["stages"]}
+    assert client.get("/api/walk", params={**merge, "node": "tree:0"}).status_code == 404
+    for row in ("0.0-0.40", "0.3-0.0", "0.0-1.2", "0.0"):
+        assert client.get("/api/walk", params={**merge, "merge": row}).status_code == 400
+
+
+def test_the_graph_of_a_project(client, project):
+    """What is accepted is optimised step by step; without two integrations that is said."""
+    graph = {"project": project, "graph": "true"}
+    assert "two accepted" in client.get("/api/walk", params=graph).json()["error"]["message"]
+    ids = [row["id"] for row in client.get(f"/api/projects/{project}/integrations").json()["integrations"]]
+    body = {"integrations": ids, "verdict": "accepted"}
+    assert client.post(f"/api/projects/{project}/decisions", json=body).status_code == 200
+    (stage,) = client.get("/api/walk", params=graph).json()["stages"]
+    asked = {**graph, "stage": "graph", "start": stage["count"] - 1}
+    assert client.get("/api/walk/steps", params=asked).json()["steps"][0]["line"] == "5"

@@ -6,7 +6,7 @@ import { failed } from "../notices.js";
 import { Player } from "./player.js";
 
 const AHEAD = 12;
-const QUESTION = ["project", "sample", "pair", "mode", "heuristic", "set"];
+const QUESTION = ["project", "sample", "pair", "merge", "node", "graph", "mode", "heuristic", "set"];
 
 const question = new URLSearchParams(location.search);
 const known = new Map();
@@ -18,7 +18,7 @@ async function start() {
   choices(walk);
   text(byId("name"), walk.title);
   document.title = `${walk.title} – segmap`;
-  const player = new Player(byId("player"), { ...walk, title: "Stages" }, { load, open });
+  const player = new Player(byId("player"), { ...walk, title: "Stages" }, { load, open, enter: into });
   player.addEventListener("step", ({ detail }) => remember(detail));
   byId("player").setAttribute("aria-busy", "false");
   await player.go(question.get("stage") || walk.stages[0].id, question.get("step") ?? 0);
@@ -30,6 +30,11 @@ async function start() {
 function asked(more = {}) {
   const held = [...question].filter(([name]) => QUESTION.includes(name));
   return new URLSearchParams([...held, ...Object.entries(more)]);
+}
+
+/** Into one integration of a merge. */
+function into(node) {
+  location.assign(`?${asked({ node })}`);
 }
 
 async function open(stage) {
@@ -65,14 +70,24 @@ function remember({ stage, step }) {
 }
 
 function choices(walk) {
-  byId("pair").value = walk.pair;
+  byId("what").value = walk.merging ? "merge" : "pair";
+  byId("pair").value = question.get("merge") || walk.pair;
+  if (question.get("project")) byId("what").append(h("option", { value: "graph" }, "pose graph"));
+  if (question.get("graph")) byId("what").value = "graph";
   options(byId("mode"), walk.modes, walk.mode);
   options(byId("heuristic"), walk.heuristics, walk.heuristic);
   byId("mode").addEventListener("change", () => (byId("heuristic").value = ""));
   byId("how").addEventListener("submit", (event) => (event.preventDefault(), again()));
   const project = question.get("project");
   const back = project && h("a.button", { href: `/projects/${encodeURIComponent(project)}` }, "Back to the project");
-  fill(byId("tools"), saving(), back);
+  const out = question.get("node") && h("a.button", { href: `?${without("node")}` }, "Back to the merge");
+  fill(byId("tools"), saving(), out, back);
+}
+
+function without(name) {
+  const held = asked();
+  held.delete(name);
+  return held;
 }
 
 /** The walkthrough as a file. */
@@ -90,8 +105,16 @@ function options(select, names, chosen) {
 /** The same scans or others, integrated in another way. */
 function again() {
   const there = new URLSearchParams([...question].filter(([name]) => ["project", "sample", "set"].includes(name)));
-  for (const name of ["pair", "mode", "heuristic"]) if (byId(name).value) there.set(name, byId(name).value);
+  for (const name of ["mode", "heuristic"]) if (byId(name).value) there.set(name, byId(name).value);
+  there.set(byId("what").value, byId("what").value === "graph" ? "true" : row(byId("pair").value, byId("what").value));
   location.assign(`?${there}`);
+}
+
+/** Scans of a merge that were asked for as a pair: some that follow the first. */
+function row(scans, what) {
+  const [log, first, last] = (/^(\d+)\.(\d+)-\d+\.(\d+)$/.exec(scans) ?? []).slice(1).map(Number);
+  if (what === "pair" && last > first + 1 && question.get("merge") === scans) return `${log}.${first}-${log}.${first + 1}`;
+  return what === "merge" && last === first + 1 ? `${log}.${first}-${log}.${first + 6}` : scans;
 }
 
 function unavailable(error) {
