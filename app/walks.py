@@ -118,6 +118,12 @@ class Subject:
         one, other = (self.scan(scan) for scan in self.scans)
         return walk_scans(one, other, self.parameters, self.heuristic, self.mode, self.title)
 
+    def pair_under(self, parameters: Parameters) -> tuple[SegmentMap, SegmentMap]:
+        """The two maps of a pair under some parameters."""
+        one, other = self.scans
+        first, second = (extract(self.scan(scan), parameters, scan.log, scan.scan) for scan in (one, other))
+        return first, second
+
     def _maps(self) -> dict[ScanId, SegmentMap]:
         return {scan: extract(self.scan(scan), self.parameters, scan.log, scan.scan) for scan in self.scans}
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query
 from fastapi.responses import FileResponse, Response
 
-from app.errors import UnknownError
+from app.errors import RequestError, UnknownError
 from app.resources import static_folder
 from app.routes.common import Site
 from app.routes.projects import attached
 from app.walk_files import KINDS, MOST_FRAMES, walk_file
-from app.walks import STEPS, Asked, Made, choices, document, stage_document
-from segmap.walkthrough import Stage
+from app.walks import STEPS, Asked, Made, Subject, choices, document, stage_document, subject_of
+from segmap.parameters import describe
+from segmap.walkthrough import SWEPT, Stage, race, sweep
 
 __all__ = ["router"]
 
@@ -76,6 +78,39 @@ def file(
     made = _made(site, asked)
     found = walk_file(made.walk, kind, asked.stage, asked.most)
     return Response(found.content, media_type=found.media_type, headers=attached(made.walk.title, found.suffix))
+
+
+class AskedSweep(Asked):
+    """One parameter through its range."""
+
+    parameter: Annotated[str, Query(max_length=80)] = "point_distance_tolerance"
+
+
+@router.get("/api/walk/race")
+def heuristic_race(site: Site, asked: Annotated[Asked, Query()]) -> dict[str, Any]:
+    """Every heuristic of both modes on one pair: tries, time, value, right or wrong where the truth is known."""
+    subject = _pair_of(site, asked)
+    runs = race(subject.pair_under, subject.truth, subject.parameters if asked.set else None)
+    return {"truth": subject.truth is not None, "runs": [asdict(run) for run in runs]}
+
+
+@router.get("/api/walk/sweep")
+def parameter_sweep(site: Site, asked: Annotated[AskedSweep, Query()]) -> dict[str, Any]:
+    """One pair with one parameter at several values."""
+    subject = _pair_of(site, asked)
+    how = subject.parameters, subject.heuristic, subject.mode, asked.parameter
+    runs = list(sweep(subject.pair_under, subject.truth, *how))
+    (unit,) = (told["unit"] for told in describe() if told["name"] == asked.parameter)
+    swept = {"parameter": asked.parameter, "unit": unit, "parameters": list(SWEPT)}
+    now = getattr(subject.parameters, asked.parameter)
+    return {**swept, "now": now, "truth": subject.truth is not None, "runs": [asdict(run) for run in runs]}
+
+
+def _pair_of(site: Site, asked: Asked) -> Subject:
+    subject = subject_of(asked, site.workspace)
+    if subject.merging or subject.edges is not None:
+        raise RequestError("Heuristics race, and parameters are swept, on one pair of scans.")
+    return subject
 
 
 def _made(site: Site, asked: AskedStage) -> Made:

@@ -14,18 +14,23 @@ from segmap.walkthrough.graphs import walk_graph
 from segmap.walkthrough.lines import ALGORITHMS
 from segmap.walkthrough.merges import MergeWalk, walk_merge
 from segmap.walkthrough.pairs import PairWalk, walk_maps, walk_scans
+from segmap.walkthrough.races import SWEPT, Run, race, sweep
 from segmap.walkthrough.steps import Mark, Shape, Stage, Step, Walkthrough
 
 __all__ = [
     "ALGORITHMS",
+    "SWEPT",
     "Mark",
     "MergeWalk",
     "PairWalk",
+    "Run",
     "SegmentMap",
     "Shape",
     "Stage",
     "Step",
     "Walkthrough",
+    "race",
+    "sweep",
     "walk_graph",
     "walk_maps",
     "walk_merge",

@@ -289,8 +289,12 @@ def candidates_stage(found: Found) -> Stage:
     return Stage(
         id="candidates",
         title="Candidates",
-        about="A candidate is a guess at how map 2 lies on map 1: a turn and a shift. Each pair of equal angles, one of"
-        " either map, gives one candidate.",
+        about="A candidate is a guess at how map 2 lies on map 1: a turn and a shift. "
+        + (
+            "Each pair of segments, one of either map, gives three."
+            if found.laid(0)
+            else "Each pair of equal angles, one of either map, gives one."
+        ),
         algorithm="laid" if found.laid(0) else "3" if found.draws else "2",
         count=len(found) + 1,
         step=lambda k: _candidates_idea(found) if k == 0 else _candidate_step(found, k - 1),
@@ -301,10 +305,16 @@ def candidates_stage(found: Found) -> Stage:
 
 
 def _candidates_idea(found: Found) -> Step:
+    if found.laid(0):
+        idea = "If a segment of map 2 is the same wall as a segment of map 1, laying one on the other lays all of map 2"
+    else:
+        idea = (
+            "If an angle of map 2 is the same corner of the building as an angle of map 1, laying one on the other lays"
+        )
+        idea += " all of map 2"
     said = (
-        f"Map 1 is blue, map 2 orange; nobody knows how they belong together. If an angle of map 2 is the same corner"
-        f" of the building as an angle of map 1, laying one on the other lays the whole of map 2 right. There are"
-        f" {len(found)} such guesses, the candidates."
+        f"Map 1 is blue, map 2 orange; nobody knows how they belong together. {idea} right. There are {len(found)} such"
+        " guesses, the candidates."
     )
     told = (("candidates", str(len(found)), ""), ("poses found twice and left out", str(found.twice), ""))
     tolerance = degrees("tolerance of angles", found.parameters.angle_difference_tolerance)
@@ -333,4 +343,5 @@ def _candidate_step(found: Found, k: int) -> Step:
     )
     off = degrees("they differ by", abs(float(wrap(size_1 - size_2))))
     told = (degrees("angle of map 1", size_1), degrees("angle of map 2", size_2), off, *pose)
-    return Step("9" if found.draws else "12", say, tuple(shapes), told)
+    line = "9" if found.draws else "4" if found.laid(0) else "12"
+    return Step(line, say, tuple(shapes), told)

@@ -86,6 +86,7 @@ ALGORITHMS = {
 1 | for each segment of map 1 with each segment of map 2
 2 |   turn map 2 until both segments have one heading
 3 |   lay start on start, end on end, middle on middle: three candidates
+4 | not clear yet which is right? then lay equal angles on each other as well
 """
         ),
     ),

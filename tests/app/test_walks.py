@@ -10,6 +10,8 @@ from PIL import Image
 
 from app.resources import samples_folder, static_folder
 from app.walk_pictures import ROLES
+from segmap.candidates import PAPER_HEURISTICS
+from segmap.walkthrough import SWEPT
 
 HALL = {"sample": "laboratory", "pair": "0.0-0.1", "heuristic": "consecutive"}
 
@@ -144,3 +146,19 @@ def test_the_graph_of_a_project(client, project):
     (stage,) = client.get("/api/walk", params=graph).json()["stages"]
     asked = {**graph, "stage": "graph", "start": stage["count"] - 1}
     assert client.get("/api/walk/steps", params=asked).json()["steps"][0]["line"] == "5"
+
+
+def test_race_and_sweep(client):
+    """Every heuristic of both modes runs, and a parameter goes through its range; the truth of a sample is known."""
+    raced = client.get("/api/walk/race", params=HALL).json()
+    assert raced["truth"]
+    assert [run["heuristic"] for run in raced["runs"] if run["mode"] == "paper"] == list(PAPER_HEURISTICS)
+    assert {run["right"] for run in raced["runs"]} <= {True, False}
+    asked = {**HALL, "parameter": "angle_difference_tolerance"}
+    swept = client.get("/api/walk/sweep", params=asked).json()
+    settings = [run["setting"] for run in swept["runs"]]
+    assert settings == sorted(settings) == list(SWEPT["angle_difference_tolerance"])
+    tries = [run["tries"] for run in swept["runs"]]
+    assert tries == sorted(tries), "a larger tolerance lets more candidates in"
+    assert client.get("/api/walk/sweep", params={**HALL, "parameter": "magic"}).status_code == 400
+    assert client.get("/api/walk/race", params={"sample": "hall", "merge": "0.0-0.3"}).status_code == 400

@@ -39,13 +39,25 @@ function series({ values, x, y }, at) {
 
 function dots({ points, x, y, logarithmic }) {
   const along = points.map((point) => (logarithmic ? Math.log10(Math.max(1e-9, point.x)) : point.x));
-  const scale = axes(x, y, spread(along), [0, Math.max(...points.map((point) => point.y), 1e-9)], logarithmic);
+  const scale = axes(x, y, spread(along), spread([0, ...points.map((point) => point.y)]), logarithmic);
+  const taken = [];
   const parts = points.flatMap((point, number) => {
     const place = scale.place(along[number], point.y);
-    const words = said(point.label ?? "", place[0] + 7, place[1] + 4, "dot-label");
-    return [dot(place, point.role, 5), words];
+    const made = dot(place, point.role, 4);
+    return point.label ? [made, beside(point.label, place, taken)] : [made];
   });
   return { parts: [...scale.parts, ...parts] };
+}
+
+/** A word at the right or the left of a dot, lower where another one stands already. */
+function beside(words, [x, y], taken) {
+  const width = 6 * words.length;
+  const left = x + 8 + width > WIDTH ? x - 8 - width : x + 8;
+  let line = y + 4;
+  const meets = (other) => Math.abs(other.line - line) < 11 && left < other.left + other.width && other.left < left + width;
+  while (taken.some(meets)) line += 11;
+  taken.push({ left, line, width });
+  return said(words, left, line, "tick");
 }
 
 function tree({ nodes, edges }, at, enter) {

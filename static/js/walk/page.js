@@ -4,6 +4,7 @@ import { get } from "../api.js";
 import { byId, fill, h, text } from "../dom.js";
 import { failed } from "../notices.js";
 import { Player } from "./player.js";
+import { races } from "./races.js";
 
 const AHEAD = 12;
 const QUESTION = ["project", "sample", "pair", "merge", "node", "graph", "mode", "heuristic", "set"];
@@ -14,6 +15,7 @@ const known = new Map();
 start().catch(unavailable);
 
 async function start() {
+  fill(byId("player"), h("p.message", { role: "status" }, "Integrating the scans, and noting every step…"));
   const walk = await get(`/api/walk?${asked()}`);
   choices(walk);
   text(byId("name"), walk.title);
@@ -81,7 +83,8 @@ function choices(walk) {
   const project = question.get("project");
   const back = project && h("a.button", { href: `/projects/${encodeURIComponent(project)}` }, "Back to the project");
   const out = question.get("node") && h("a.button", { href: `?${without("node")}` }, "Back to the merge");
-  fill(byId("tools"), saving(), out, back);
+  const racing = !walk.merging && !question.get("graph") && !question.get("node") && races(asked);
+  fill(byId("tools"), racing, saving(), out, back);
 }
 
 function without(name) {
