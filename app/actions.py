@@ -48,6 +48,8 @@ def _set_picked(view: View, value: Any) -> None:
     view.set_picked(source, segment)
 
 
+MAP = ("set_colouring", "toggle_component", "isolate", "set_compare", "set_side")
+"""actions on the merged map"""
 ACTIONS: Mapping[str, Callable[[View, Any], None]] = {
     **{
         name: _plain(name)
@@ -61,13 +63,14 @@ ACTIONS: Mapping[str, Callable[[View, Any], None]] = {
             "next_stage",
             "previous_stage",
             "toggle_dimension",
+            "toggle_measuring",
             "fit",
             "skip",
             "undo",
             "redo",
         )
     },
-    **{name: _with(name, str) for name in ("select", "set_heuristic", "set_stage", "toggle_layer", "set_theme")},
+    **{name: _with(name, str) for name in ("select", "set_heuristic", "set_stage", "toggle_layer", "set_theme", *MAP)},
     **{name: _with(name, int) for name in ("set_candidate", "set_dimension")},
     **{name: _decision(name) for name in ("accept", "reject")},
     "set_picked": _set_picked,

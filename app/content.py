@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from app.drawables import Box, Pick, box
+from app.map_looks import MapContent
 from app.palette import PALETTES, Palette
 from app.sights import Sights
 from segmap.chains import MatchingChain
@@ -20,7 +21,7 @@ from segmap.pose import FloatArray, Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 
-__all__ = ["Content", "Pair", "Placed", "Tie", "merit", "place"]
+__all__ = ["Content", "Pair", "Placed", "Tie", "alongside", "merit", "place"]
 
 GAP = 1.0
 """metres between things that have no relation to each other"""
@@ -91,6 +92,11 @@ class Tie:
     chi: float | None = None
     """standard deviations from where the graph has it, of what is accepted"""
     silenced: bool = False
+    who: str = ""
+    """who decided"""
+    value: float | None = None
+    """metres"""
+    confidence: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +134,31 @@ def place(components: Iterable[Component], scans: Iterable[ScanId] = ()) -> tupl
     return tuple(placed)
 
 
+def alongside(placed: Sequence[Placed], others: Iterable[Component], *, over: bool) -> tuple[Placed, ...]:
+    """Where components of another map of the same scans are drawn.
+
+    Each is laid on the component with which it shares its first scan that both hold, and, unless ``over``, moved to
+    the right of the whole map; those that share none stand in a row beyond.
+    """
+    shown = [one.map.bounds for one in placed if one.map.bounds is not None]
+    width = (max(b[2] for b in shown) - min(b[0] for b in shown) + 2.0 * GAP) if shown else 0.0
+    shift = Pose2.identity() if over else Pose2(width, 0.0, 0.0)
+    found: list[Placed] = []
+    right = (max(b[2] for b in shown) if shown else 0.0) + (0.0 if over else width)
+    for component in others:
+        if len(component.scans) < 2:
+            continue
+        home = next(((p, s) for s in component.scans for p in placed if s in p.component.poses), None)
+        if home is None:
+            left, bottom, to, _ = component.map.bounds or (0.0, 0.0, 0.0, 0.0)
+            found.append(Placed(component, Pose2(right - left + GAP, -bottom, 0.0)))
+            right += to - left + GAP
+        else:
+            part, scan = home
+            found.append(Placed(component, shift @ part.pose(scan) @ component.poses[scan].inverse()))
+    return tuple(found)
+
+
 @dataclass(frozen=True, eq=False)
 class Content:
     """A stage of an integration, or the merged map, and how to look at it."""
@@ -146,6 +177,10 @@ class Content:
     picked: Pick | None = None
     message: str = ""
     """what to say where there is nothing to see"""
+    map: MapContent = field(default_factory=MapContent)
+    """how the merged map is looked at"""
+    measured: tuple[tuple[float, float], ...] = ()
+    """metres; the places that were clicked to measure"""
 
     @property
     def palette(self) -> Palette:
@@ -158,9 +193,28 @@ class Content:
         return place(self.components, self.pair.scans if self.pair else ())
 
     @cached_property
+    def shown_parts(self) -> tuple[Placed, ...]:
+        """The components that are not hidden."""
+        return tuple(p for p in self.placed if p.component.scans[0] not in self.map.looks.hidden)
+
+    def pose_of(self, placed: Placed, scan: ScanId) -> Pose2:
+        """Where a scan of a component is drawn; while the map moves, where it is on its way."""
+        motion = self.map.motion
+        pose = motion.poses.get(scan) if motion is not None else None
+        return placed.pose(scan) if pose is None else placed.T_map_component @ pose
+
+    @cached_property
     def places(self) -> Mapping[ScanId, Pose2]:
-        """Where each scan of the map is drawn."""
-        return {scan: placed.pose(scan) for placed in self.placed for scan in placed.component.scans}
+        """Where each scan of the map that is shown is drawn."""
+        return {scan: self.pose_of(placed, scan) for placed in self.shown_parts for scan in placed.component.scans}
+
+    @cached_property
+    def beside(self) -> tuple[Placed, ...]:
+        """The components of the map to compare with, where they are drawn."""
+        other = self.map.other
+        if other is None or self.stage != "map":
+            return ()
+        return alongside(self.placed, other.components, over=self.map.looks.side == "over")
 
     def map_of(self, source: str) -> SegmentMap | None:
         """The map that a Pick's source names, in its frame; None where it is not shown."""
@@ -187,7 +241,7 @@ class Content:
     def bounds(self) -> Box | None:
         """The box around what matters, metres; None where there is nothing."""
         if self.stage == "map":
-            return box(*(p.map.coordinates for p in self.placed))
+            return box(*(p.map.coordinates for p in self.shown_parts), *(p.map.coordinates for p in self.beside))
         if self.pair is None:
             return None
         first, second = (

@@ -53,7 +53,7 @@ class Drawable:
     thickness: float = 2.0
     """pixels on the screen"""
     colours: NDArray[np.uint8] | None = None
-    """points only: one colour for each, shape (n, 3)"""
+    """one colour for each point or line, shape (n, 3)"""
     text: str = ""
     anchor: Literal["bottom-center", "top-center", "center-left"] = "center-left"
     """where a label has its place"""
@@ -67,8 +67,8 @@ class Drawable:
         shape = (3,) if self.kind == "label" else (len(self.points), *tail)
         if self.points.shape != shape or not np.isfinite(self.points).all():
             raise ValueError(f"{self.name}: {self.kind} cannot be drawn from an array of shape {self.points.shape}.")
-        if self.colours is not None and self.colours.shape != self.points.shape:
-            raise ValueError(f"{self.name}: {len(self.colours)} colours for {len(self.points)} points.")
+        if self.colours is not None and self.colours.shape != (len(self.points), 3):
+            raise ValueError(f"{self.name}: {len(self.colours)} colours for {len(self.points)} {self.kind}.")
         if self.source and len(self.segments) != len(self.points):
             raise ValueError(f"{self.name}: {len(self.segments)} segments for {len(self.points)} lines.")
 

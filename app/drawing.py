@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from app import graph_layers, grid, map_layers, pair_layers
+from app import graph_layers, grid, map_layers, marks, pair_layers
 from app.claims import NUDGED
 from app.content import Content, Pair, merit
-from app.drawables import Box, Drawable, Frame, label, lines
+from app.drawables import Box, Drawable, label
 from app.palette import RGB
 from app.sights import CLASSES
 from segmap.pose import Pose2
@@ -68,7 +68,7 @@ def draw(content: Content) -> Picture:
     """The picture of a content; empty scans, one segment or no candidate give a sensible, smaller one."""
     shown = layers(content)
     drawables = [d for layer in shown if layer.visible for d in _KINDS[layer.name].drawer(content)]
-    drawables += _picked(content)
+    drawables += [*marks.picked(content), *marks.measured(content)]
     if content.bounds is None:
         text = content.message or "There is nothing to show yet."
         drawables.append(label("message", "message", text, (0.0, 0.0), content.palette.text))
@@ -92,6 +92,8 @@ def _layer(name: str, visible: bool, content: Content) -> Layer:
     kind = _KINDS[name]
     if name == "candidates":
         visible = content.dimension == 3
+    if name == "other":
+        visible = content.map.other is not None
     if name == "returns" and content.stage == "candidate":
         visible = content.pair is None or content.pair.sights is None  # otherwise they are drawn as lines of sight
     visible = content.shown.get(name, visible)
@@ -103,17 +105,6 @@ def _subject(content: Content) -> tuple[str, ...]:
     if content.stage == "map":
         return ("map", *(placed.component.name for placed in content.placed[:1]))
     return (integration, "superimposed" if content.superimposed else "side by side")
-
-
-def _picked(content: Content) -> Iterator[Drawable]:
-    """The segment that was clicked, marked."""
-    pick = content.picked
-    segment_map = None if pick is None else content.map_of(pick.source)
-    if pick is None or segment_map is None or not 0 <= pick.segment < len(segment_map):
-        return
-    frame: Frame = "first" if pick.source == "first" else "second" if pick.source == "second" else "map"
-    marked = lines(segment_map.coordinates[[pick.segment]])
-    yield Drawable("picked", "picked", "lines", marked, content.palette.accent, frame, depth=15, thickness=8.0)
 
 
 # --- the legend -----------------------------------------------------------------------------------
@@ -174,7 +165,8 @@ def _map_caption(content: Content) -> str:
     scans = sum(len(placed.component.scans) for placed in content.placed)
     alone = content.scans - scans
     told = f"{_count(len(content.placed), 'component')} of {_count(scans, 'scan')}, {length:.0f} m of segments"
-    return told + (f"; {_count(alone, 'scan')} not placed" if alone > 0 else "")
+    left = f"; {_count(alone, 'scan')} not placed" if alone > 0 else ""
+    return told + left + map_layers.map_caption(content)
 
 
 def _in_map_caption(content: Content) -> str:
@@ -193,7 +185,7 @@ def _colours(*names: str) -> Callable[[Content], tuple[RGB, ...]]:
     return lambda content: tuple(getattr(content.palette, name) for name in names)
 
 
-def _component_colours(content: Content) -> tuple[RGB, ...]:
+def _trajectory_colours(content: Content) -> tuple[RGB, ...]:
     return tuple(map_layers.component_colour(content, k) for k in range(max(1, min(6, len(content.placed)))))
 
 
@@ -256,15 +248,16 @@ _KINDS = {
         _of_pair(_fused_caption),
         lambda content: (*content.palette.chains[:3], content.palette.neutral),
     ),
-    "map": _Kind("Merged map", "m", map_layers.components, _map_caption, _component_colours),
+    "map": _Kind("Merged map", "m", map_layers.components, _map_caption, map_layers.map_colours),
     "pair": _Kind("This pair", "m", map_layers.pair_in_map, _in_map_caption, _colours("first", "second")),
     "trajectory": _Kind(
-        "Trajectory", "m", map_layers.trajectory, lambda _: "where the accepted scans were taken", _component_colours
+        "Trajectory", "m", map_layers.trajectory, lambda _: "where the accepted scans were taken", _trajectory_colours
     ),
     "edges": _Kind("Integrations", "σ", graph_layers.edges, graph_layers.edges_caption, graph_layers.colours),
     "closures": _Kind(
         "Loop closures", "m", graph_layers.candidates, graph_layers.candidates_caption, _colours("first")
     ),
+    "other": _Kind("Compared with", "m", map_layers.other, map_layers.other_caption, _colours("second")),
     "grid": _Kind("Grid", "m", grid.draw, grid.caption, _colours("neutral")),
 }
 LAYERS = tuple(_KINDS)
@@ -297,7 +290,15 @@ LAYERS_OF: dict[str, dict[str, bool]] = {
         "grid": True,
     },
     "fused": {"fused": True, "first": True, "second": True, "returns": False, "sensors": True, "grid": True},
-    "map": {"map": True, "pair": True, "trajectory": True, "edges": True, "closures": True, "grid": True},
+    "map": {
+        "map": True,
+        "pair": True,
+        "trajectory": True,
+        "edges": True,
+        "closures": True,
+        "other": True,
+        "grid": True,
+    },
 }
 """The layers of each stage, and whether they are drawn where nobody said otherwise."""
 

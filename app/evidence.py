@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING, Any
 from app.content import Content, Pair, Tie
 from app.drawing import LAYERS_OF
 from app.looks import Looks
+from app.map_looks import MapContent
 from app.review import Row
 from app.sights import sights
 from segmap.chains import matching_chains
 from segmap.fusion import fuse
 from segmap.integration import Match, heuristics
+from segmap.merging import Component, misfit
+from segmap.pose import FloatArray
 from segmap.project import IntegrationId, ProjectState
 from segmap.scans import ScanId
 
@@ -41,7 +44,8 @@ def _is_tie(row: Row) -> bool:
 
 
 def _tie(row: Row) -> Tie:
-    return Tie(row.id, row.first, row.second, row.state == "accepted", row.chi, row.silenced)
+    decided = row.who, row.value, row.confidence
+    return Tie(row.id, row.first, row.second, row.state == "accepted", row.chi, row.silenced, *decided)
 
 
 def _found(match: Match) -> dict[str, Any]:
@@ -58,6 +62,7 @@ class Evidence:
         self._chains = lru_cache(KEPT)(matching_chains)
         self._fused = lru_cache(KEPT)(fuse)
         self._sights = lru_cache(KEPT)(sights)
+        self._misfit = lru_cache(KEPT)(self._misfit_of)
 
     def match(self, looks: Looks) -> Match | None:
         """The match of the integration looked at, by the heuristic looked at; None: not computed yet."""
@@ -89,7 +94,21 @@ class Evidence:
             shown=looks.shown,
             picked=looks.picked,
             message=self._message(looks, pair),
+            map=self._map(looks),
+            measured=looks.measured,
         )
+
+    def _map(self, looks: Looks) -> MapContent:
+        """How the merged map is looked at, with what that takes."""
+        if looks.stage != "map":
+            return MapContent(looks.map)
+        off = {}
+        if looks.map.colouring == "misfit":
+            off = {part.name: self._misfit(part) for part in self._session.components() if len(part.scans) > 1}
+        return MapContent(looks.map, off, self._session.others.get(looks.map.compare) if looks.map.compare else None)
+
+    def _misfit_of(self, part: Component) -> FloatArray:
+        return misfit(part, {scan: self._session.segment_map(scan) for scan in part.scans})
 
     def _pair(self, looks: Looks) -> Pair | None:
         if looks.integration is None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from app.drawables import Pick
+from app.map_looks import MapLooks
 
 __all__ = ["Looks"]
 
@@ -31,6 +32,11 @@ class Looks:
     """what the last action did, for people"""
     fits: int = 0
     """how often somebody asked to see everything"""
+    map: MapLooks = field(default_factory=MapLooks)
+    measuring: bool = False
+    """whether clicks measure"""
+    measured: tuple[tuple[float, float], ...] = ()
+    """metres; the places that were clicked to measure, two at most"""
 
     @property
     def shown(self) -> dict[str, bool]:
@@ -39,7 +45,9 @@ class Looks:
 
     def at(self, integration: str | None, heuristic: str | None = None, rank: int = 0) -> Looks:
         """The same view of another integration, or of another candidate of it."""
-        return replace(self, integration=integration, heuristic=heuristic, rank=rank, picked=None, notice="")
+        return replace(
+            self, integration=integration, heuristic=heuristic, rank=rank, picked=None, notice="", measured=()
+        )
 
     def switch(self, layer: str, on: bool) -> Looks:
         """With a layer of this stage drawn or not."""

@@ -49,6 +49,20 @@ class Palette:
         """The colour of a chain or a component by its place; colours come again when they run out."""
         return self.chains[index % len(self.chains)]
 
+    @property
+    def heat(self) -> tuple[RGB, ...]:
+        """From as it should be to bad."""
+        return self.good, self.sights[2], self.bad
+
+    def by_heat(self, shares: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """Colours, shape (n, 3), of badness between 0 and 1, shape (n,); what is not known is neutral."""
+        stops = np.linspace(0.0, 1.0, len(self.heat))
+        known = np.nan_to_num(shares.clip(0.0, 1.0))
+        channels = [np.interp(known, stops, channel) for channel in np.array(self.heat, float).T]
+        mixed = np.round(np.stack(channels, axis=-1)).astype(np.uint8)
+        mixed[np.isnan(shares)] = self.neutral
+        return mixed
+
     def by_value(self, shares: NDArray[np.float64]) -> NDArray[np.uint8]:
         """Colours, shape (n, 3), of values between 0 and 1, shape (n,)."""
         stops = np.linspace(0.0, 1.0, len(self.values))

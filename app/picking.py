@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import shapely
 
-from app.content import Content
+from app.content import Content, Tie
 from app.drawables import Pick
 from app.drawing import Picture
+from app.graph_layers import TIES
+from app.marks import seen_by
 from app.palette import hexadecimal
+from segmap.scans import ScanId
 
-__all__ = ["explain", "nearest"]
+__all__ = ["corner", "explain", "nearest"]
+
+TOLD = 12
+"""integrations that are told of a merged wall"""
 
 
 def nearest(picture: Picture, x: float, y: float, reach: float) -> Pick | None:
@@ -42,9 +49,55 @@ def explain(content: Content) -> dict[str, Any] | None:
         "segment": pick.segment,
         "length": float(segment_map.lengths[pick.segment]),
         "heading": float(np.degrees(segment_map.headings[pick.segment])),
-        "scans": sorted({f"{s.log}.{s.scan}" for s in segment_map.sources[pick.segment]}),
+        "scans": [str(scan) for scan in seen_by(segment_map, pick.segment)],
     }
-    return {**told, **_in_chain(content, pick)} if pick.source in ("first", "second") else told
+    if pick.source in ("first", "second"):
+        return {**told, **_in_chain(content, pick)}
+    return {**told, **_origin(content, seen_by(segment_map, pick.segment))}
+
+
+def _origin(content: Content, scans: Sequence[ScanId]) -> dict[str, Any]:
+    """The accepted integrations that put a merged wall where it is: those between the scans that saw it.
+
+    Where no integration is between two of them, those that hold one of them.
+    """
+    seen = set(scans)
+    held = [tie for tie in content.ties if tie.accepted]
+    inside = [tie for tie in held if tie.first in seen and tie.second in seen]
+    chosen = inside or [tie for tie in held if tie.first in seen or tie.second in seen]
+    return {
+        "between": bool(inside),
+        "integrations": [_decision(tie) for tie in chosen[:TOLD]],
+        "more": max(0, len(chosen) - TOLD),
+        "misfit": _misfit(content),
+    }
+
+
+def _decision(tie: Tie) -> dict[str, Any]:
+    told = ("who", "value", "confidence", "chi", "silenced")
+    return {"id": tie.integration, **{name: getattr(tie, name) for name in told}}
+
+
+def _misfit(content: Content) -> float | None:
+    pick = content.picked
+    off = None if pick is None else content.map.misfits.get(pick.source)
+    return None if pick is None or off is None or np.isnan(off[pick.segment]) else float(off[pick.segment])
+
+
+def corner(picture: Picture, x: float, y: float, reach: float) -> tuple[float, float] | None:
+    """The end of a drawn segment nearest to a place, at most ``reach`` away, metres: what measuring snaps to."""
+    ends = [
+        picture.T_1_2 @ flat if drawable.frame == "second" else flat
+        for drawable in picture.drawables
+        if drawable.source and drawable.source != TIES
+        for flat in (drawable.points[:, :, :2].astype(np.float64).reshape(-1, 2),)
+    ]
+    if not ends or not sum(map(len, ends)):
+        return None
+    together = np.concatenate(ends)
+    away = np.hypot(*(together - (x, y)).T)
+    at = int(away.argmin())
+    return (float(together[at, 0]), float(together[at, 1])) if away[at] <= reach else None
 
 
 def _in_chain(content: Content, pick: Pick) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field, StringConstraints
 
 from app.bodies import Body, Name
 
-__all__ = ["Copying", "DeletedList", "DeletedProject", "LogsAdded", "NewProject", "Renaming"]
+__all__ = ["Copying", "DeletedList", "DeletedProject", "LogsAdded", "NewProject", "OtherMap", "OtherMaps", "Renaming"]
 
 Title = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
 
@@ -47,6 +47,19 @@ class DeletedList(BaseModel):
     """The deleted projects."""
 
     projects: list[DeletedProject]
+
+
+class OtherMap(BaseModel):
+    """A map the merged one can be compared with."""
+
+    name: str
+    title: str
+
+
+class OtherMaps(BaseModel):
+    """What the merged map can be compared with."""
+
+    options: list[OtherMap]
 
 
 class LogsAdded(BaseModel):

@@ -57,7 +57,28 @@ SCRIPT = b"""<script>
     set(control.mouseButtons, "left", held ? 2 : 1);
     set(control.touches, "one", held ? 128 : 64);
     set(control, "dollyToCursor", held);
+    scaleBar(held, control.distance);
   }, 100);
+
+  // How long a metre is on the screen: only in 2D, where it is the same everywhere.
+  const bar = Object.assign(document.createElement("div"), { id: "scale-bar", ariaHidden: "true" });
+  bar.style.cssText = "position:fixed;left:14px;bottom:14px;z-index:5;padding:0 4px 2px;pointer-events:none;" +
+    "font:600 12px system-ui,sans-serif;border:solid;border-width:0 2px 2px;text-align:center;" +
+    "color:var(--mantine-color-text,#444);border-color:currentColor";
+  const nice = (most) => {
+    const power = 10 ** Math.floor(Math.log10(most));
+    return [5, 2, 1].find((step) => step * power <= most) * power;
+  };
+  const scaleBar = (shown, distance) => {
+    if (!bar.isConnected && document.body) document.body.append(bar);
+    bar.hidden = !shown;
+    const canvas = document.querySelector("canvas"), tall = canvas?.clientHeight;
+    if (!shown || !tall || !(distance > 0)) return;
+    const metre = tall / (2 * distance * Math.tan((viewer().camera.fov * Math.PI) / 360));
+    const length = nice(120 / metre);
+    bar.style.width = `${length * metre}px`;
+    bar.textContent = length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
+  };
 })();
 </script>
 """

@@ -9,6 +9,7 @@ from typing import Any
 
 from app.changes import Change, changed, events_of, is_accepted, settings_of
 from app.claims import suggested_rank, with_claim
+from app.comparing import Others
 from app.creation import Filled, Source, put_in, read_sources
 from app.criterion import CRITERIA, Criterion
 from app.deciding import choose
@@ -63,6 +64,8 @@ class Session(Steps):
         self._tell = self._listeners.tell
         self._state = store.state
         self._inputs = Inputs(store, self._state.logs, store.log_bytes, known_logs)
+        self.extractor: Extractor = self._inputs.segment_map
+        """the segments of a scan under any parameters"""
         self._integrations = tuple[str, ...]()
         self._rows = Rows(())
         self._version, self._queue = 0, (-1, tuple[Row, ...]())
@@ -94,6 +97,7 @@ class Session(Steps):
             failed=lambda why: self._tell({"type": "error", "message": why}),
             prepare=self._prepare,
         )
+        self.others = Others(self, lambda: self._tell({"type": "other"}), self._prepare)
         start = ProjectState(parameters=self._state.parameters)
         self._follow(Change(self._state, changed(start, self._state)), start)
 
@@ -117,11 +121,6 @@ class Session(Steps):
     def scan(self, scan_id: ScanId) -> LaserScan:
         """A scan, as read. Raises UnknownError or ScanError where there is none."""
         return self._inputs.scan(scan_id)
-
-    @property
-    def extractor(self) -> Extractor:
-        """The segments of a scan under any parameters."""
-        return self._inputs.segment_map
 
     def segment_map(self, scan_id: ScanId) -> SegmentMap:
         """The segments of a scan, under the parameters in force."""
@@ -254,10 +253,13 @@ class Session(Steps):
         """
         return self._map.wait(timeout)
 
+    def history(self, revision: int) -> tuple[Event, ...]:
+        """What happened up to a revision."""
+        return tuple(event for event in self._store.events() if event.seq <= revision)
+
     def record(self) -> Record:
         """All a report tells beside the map: decisions, evidence, the pose graph of what is accepted now."""
-        state = self._state
-        return self._reporter.record(state, graph_of(state, self._solve), self.scan_ids)
+        return self._reporter.record(self._state, graph_of(self._state, self._solve), self.scan_ids)
 
     # --- listening, and the end -------------------------------------------------------------------
 
@@ -265,13 +267,13 @@ class Session(Steps):
         """Call ``listener`` with every event, from any thread, until what is given back is called.
 
         Events are JSON-able and have a ``type``: match, decision, progress, graph, map, search, parameters,
-        project, log, deleted or error.
+        project, log, other, deleted or error.
         """
         return self._listeners.add(listener)
 
     def settle(self, timeout: float | None = None) -> bool:
         """Wait until nothing is left to compute; False when the time, in seconds, ran out before."""
-        parts = (self.loops, self._matching, self._map)
+        parts = (self.loops, self._matching, self._map, self.others)
         return all(part.settle(timeout) for part in parts)
 
     @property
@@ -285,7 +287,7 @@ class Session(Steps):
 
     def close(self) -> None:
         """Stop all work and close the project file."""
-        for part in (self.loops, self._matching, self._map):
+        for part in (self.loops, self._matching, self._map, self.others):
             part.close()
         self._store.close()
 

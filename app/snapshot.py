@@ -10,6 +10,9 @@ from app.content import Content, Pair
 from app.drawing import STAGES, Layer, layers
 from app.evidence import Evidence
 from app.looks import Looks
+from app.map_layers import component_colour
+from app.map_looks import COLOURINGS
+from app.marks import measurement
 from app.palette import hexadecimal
 from app.picking import explain
 from app.review import Outcome
@@ -48,11 +51,36 @@ def snapshot(session: Session, evidence: Evidence, looks: Looks, content: Conten
         "heuristics": _heuristics(session, looks, evidence.heuristic(looks)),
         "chains": _chains(content),
         "picked": explain(content),
+        "map": _map(content),
+        "measuring": looks.measuring,
+        "measured": _measured(content),
         "undo": state.can_undo,
         "redo": state.can_redo,
         "revision": state.revision,
         "messages": [text for text in (looks.notice, content.message) if text],
     }
+
+
+def _map(content: Content) -> dict[str, Any]:
+    """How the merged map is looked at."""
+    looks, other = content.map.looks, content.map.other
+    return {
+        "colouring": looks.colouring,
+        "colourings": [{"name": name, "title": title} for name, title in COLOURINGS.items()],
+        "hidden": sorted(map(str, looks.hidden)),
+        "compare": looks.compare,
+        "side": looks.side,
+        "other": None if other is None else {"name": other.name, "title": other.title, "problem": other.problem},
+        "colours": {
+            str(placed.component.scans[0]): hexadecimal(component_colour(content, place))
+            for place, placed in enumerate(content.placed)
+        },
+    }
+
+
+def _measured(content: Content) -> dict[str, Any] | None:
+    found = measurement(content.measured)
+    return None if found is None else asdict(found)
 
 
 def _layer(layer: Layer) -> dict[str, Any]:

@@ -18,11 +18,12 @@ from app.actions import perform
 from app.content import Content
 from app.drawables import Pick
 from app.drawing import LAYERS, STAGES, Picture, draw, layers
-from app.errors import RequestError, UnknownError
+from app.errors import UnknownError
 from app.evidence import Evidence
 from app.graph_layers import TIES
 from app.listeners import Listeners
 from app.looks import Looks
+from app.map_view import MapActions, known
 from app.palette import THEMES
 from app.picking import nearest
 from app.review import Row
@@ -30,6 +31,8 @@ from app.snapshot import snapshot
 from segmap.errors import ProjectError
 from segmap.events import Decision
 from segmap.integration import heuristics
+from segmap.pose import FloatArray
+from segmap.scans import ScanId
 
 if TYPE_CHECKING:
     from app.session import Session
@@ -38,11 +41,11 @@ __all__ = ["View"]
 
 DOUBLE_CLICK_SECONDS = 0.35
 """a decision so soon after the last one was meant for the pair that has just gone"""
-RELEVANT = ("decision", "map", "graph", "parameters", "log")
+RELEVANT = ("decision", "map", "graph", "parameters", "log", "other")
 """session events after which a view may look different"""
 
 
-class View:
+class View(MapActions):
     """What one page shows of a session. Thread-safe; actions raise SegmapError with a sentence for people."""
 
     def __init__(self, session: Session, *, who: str = "", clock: Callable[[], float] = time.monotonic) -> None:
@@ -71,6 +74,10 @@ class View:
     def content(self) -> Content:
         """All that the picture is made from, now."""
         return self._evidence.content(self._looks)
+
+    def walls_of(self, scan: ScanId) -> FloatArray:
+        """The segments of a scan in its own frame, (n, 4), metres."""
+        return self.session.segment_map(scan).coordinates
 
     def picture(self) -> Picture:
         """What is to be drawn now."""
@@ -172,14 +179,14 @@ class View:
 
     def set_heuristic(self, heuristic: str) -> None:
         """Look at what a heuristic finds on this pair; the project's heuristic stays what it is."""
-        _known(heuristic, self._heuristics, "heuristic")
+        known(heuristic, self._heuristics, "heuristic")
         with self._acting:
             self._look(self._looks.at(self._looks.integration, heuristic))
 
     def set_stage(self, stage: str) -> None:
         """Look at a stage, one of STAGES."""
-        _known(stage, STAGES, "stage")
-        self._change(stage=stage, picked=None)
+        known(stage, STAGES, "stage")
+        self._change(stage=stage, picked=None, measured=())
 
     def next_stage(self) -> None:
         """The next stage; the last stays."""
@@ -204,13 +211,13 @@ class View:
 
     def switch_layer(self, layer: str, on: bool) -> None:
         """Draw a layer of this stage or not."""
-        _known(layer, LAYERS, "layer")
+        known(layer, LAYERS, "layer")
         with self._acting:
             self._look(self._looks.switch(layer, on))
 
     def set_dimension(self, dimension: int) -> None:
         """Look straight down (2) or from the side (3)."""
-        _known(dimension, (2, 3), "dimension")
+        known(dimension, (2, 3), "dimension")
         self._change(dimension=dimension)
 
     def toggle_dimension(self) -> None:
@@ -220,7 +227,7 @@ class View:
 
     def set_theme(self, theme: str) -> None:
         """Draw on a light or on a dark background."""
-        _known(theme, THEMES, "theme")
+        known(theme, THEMES, "theme")
         self._change(theme=theme)
 
     def fit(self) -> None:
@@ -234,6 +241,9 @@ class View:
         In the map, a click on the line of an integration selects it.
         """
         content = self.content()
+        if self._looks.measuring:
+            self._measure(draw(content), float(x), float(y), float(reach))
+            return
         picked = nearest(draw(content), float(x), float(y), float(reach))
         if picked is not None and picked.source == TIES:
             self.select(content.ties[picked.segment].integration)
@@ -368,8 +378,3 @@ class View:
             self.session.request(looks.integration, self._evidence.heuristic(looks))
         self._seen = self.session.state.revision
         self._listeners.tell({"type": "view", **self.snapshot()})
-
-
-def _known(value: object, among: Sequence[object], what: str) -> None:
-    if value not in among:
-        raise RequestError(f"There is no {what} {str(value)[:80]!r}: take one of {', '.join(map(str, among))}.")

@@ -7,6 +7,7 @@ from typing import Any
 from fastapi import APIRouter
 
 from app.actions import perform
+from app.project_schemas import OtherMap, OtherMaps
 from app.routes.common import Opened, Site
 from app.schemas import Action, ViewOpened
 
@@ -20,6 +21,12 @@ def open_view(site: Site, session: Opened) -> ViewOpened:
     """A new view of a project, with a scene of its own."""
     opened = site.views.open(session)
     return ViewOpened(id=opened.id, scene=f"/views/{opened.id}/scene/")
+
+
+@router.get("/projects/{project}/others")
+def others(session: Opened) -> OtherMaps:
+    """What the merged map can be compared with: earlier states, other methods."""
+    return OtherMaps(options=[OtherMap(**option) for option in session.others.options()])
 
 
 @router.get("/views/{view}")

@@ -8,10 +8,14 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections.abc import Callable
 
 import viser
 
+from app.content import Content
+from app.drawing import draw
+from app.motion import FRAME_SECONDS, on_the_way
 from app.palette import PALETTES
 from app.scene.camera import Cameras, reach
 from app.scene.nodes import Nodes
@@ -33,6 +37,7 @@ class Scene:
         self._view = view
         self._server = QuietServer()
         self._theme = ""
+        self._content: Content | None = None
         self._doing = threading.Lock()
         self._stale, self._closed = threading.Event(), False
         self._nodes = Nodes(self._server.scene)
@@ -76,12 +81,25 @@ class Scene:
                 self._fail(error)
 
     def _draw(self) -> None:
-        picture, snapshot, fits = self._view.picture(), self._view.snapshot(), self._view.looks.fits
+        before, self._content = self._content, self._view.content()
+        content, snapshot, fits = self._content, self._view.snapshot(), self._view.looks.fits
+        if before is not None:
+            self._move(before, content)
+        picture = draw(content)
         with self._server.atomic():
             self._dress(picture.theme)
             self._nodes.show(picture)
             self._panel.show(snapshot)
         self._cameras.follow(picture, fits)
+
+    def _move(self, before: Content, after: Content) -> None:
+        """Show the map on its way from one state of the graph to the next, as long as nothing newer is to be shown."""
+        for content in on_the_way(before, after, self._view.walls_of):
+            if self._stale.is_set() or self._closed:
+                return
+            with self._server.atomic():
+                self._nodes.show(draw(content))
+            time.sleep(FRAME_SECONDS)
 
     def _dress(self, theme: str) -> None:
         if theme != self._theme:

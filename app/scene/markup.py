@@ -227,8 +227,7 @@ def picked(snapshot: Snapshot) -> str:
         return _block(f'<span style="{FAINT}">Click a segment to see what it adds to the value.</span>')
     size = f"{told['length']:.2f} m long, heading {_number(told['heading'], 1)}°"
     if "adds" not in told:
-        scans = ", ".join(_text(scan) for scan in told["scans"])
-        return _block(f"<b>Segment {told['segment']}</b> of the map, {size}; seen by {_scans(scans)}")
+        return _block(_wall(told, size))
     head = f"<b>Segment {told['segment']}</b> of {_text(told['name'])}, {size}"
     if told["chain"] is None:
         return _block(f"{head}<div>matches nothing: it adds 0 m</div>")
@@ -238,6 +237,19 @@ def picked(snapshot: Snapshot) -> str:
     partners = ", ".join(f"{match['segment']} ({match['value']:.2f} m)" for match in told["matches"])
     whole = f"{swatch} chain {chain['number']}: {_count(chain['segments'], 'segment')}, {chain['value']:.2f} m"
     return _block(f"{head}{adds}<div>matches {partners}</div><div>{whole}</div>")
+
+
+def _wall(told: Mapping[str, Any], size: str) -> str:
+    """A wall of the merged map: which scans saw it, and which decisions put it there."""
+    scans = ", ".join(_text(scan) for scan in told["scans"])
+    off = f", {100.0 * told['misfit']:.1f} cm misfit" if told["misfit"] is not None else ""
+    head = f"<b>Segment {told['segment']}</b> of the map, {size}{off}; seen by {_scans(scans)}"
+    decided = "".join(
+        f"<div>{_text(one['id'])}, accepted{' by ' + _text(one['who']) if one['who'] else ''}</div>"
+        for one in told["integrations"]
+    )
+    more = f"<div>and {told['more']} more</div>" if told["more"] else ""
+    return f'{head}<div style="{FAINT}">{decided}{more}</div>'
 
 
 def _scans(scans: str) -> str:

@@ -40,6 +40,7 @@ HOTKEYS: tuple[tuple[str, str, str | None, str], ...] = (
     ("Redo", "R", None, "redo"),
     ("2D or 3D", "V", None, "toggle_dimension"),
     ("Fit everything into the window", "F", None, "fit"),
+    ("Measure between two clicks", "M", None, "toggle_measuring"),
 )
 """label, key, modifier, action of the view; W A S D Q E and the arrows are viser's own"""
 

@@ -8,6 +8,7 @@ cannot be integrated is a component of its own: nothing is ever placed without e
 from segmap.merging.calls import Call, Decided, Given, Link, Pair
 from segmap.merging.closing import Closure
 from segmap.merging.components import Accepted, Component, map_hash, merge_accepted
+from segmap.merging.misfit import misfit, witnesses
 from segmap.merging.nodes import Flag, MergeNode, MergeStep, outline
 from segmap.merging.online import extend
 from segmap.merging.sequences import METHODS, Merge, calls_needed, merge, neighbours
@@ -31,6 +32,8 @@ __all__ = [
     "map_hash",
     "merge",
     "merge_accepted",
+    "misfit",
     "neighbours",
     "outline",
+    "witnesses",
 ]

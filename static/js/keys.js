@@ -28,6 +28,7 @@ export const KEYS = [
     ["1–6", "a stage by its number", "stage"],
     ["V", "2D or 3D", "toggle_dimension"],
     ["F", "fit everything into the window", "fit"],
+    ["M", "measure between two clicks", "toggle_measuring"],
     ["?", "this sheet", "help"],
   ]],
 ];

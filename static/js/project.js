@@ -11,6 +11,7 @@ import { inputs } from "./inputs.js";
 import { restore } from "./keeping.js";
 import { listen, sheet } from "./keys.js";
 import { loops } from "./loops.js";
+import { mapTools } from "./maptools.js";
 import { Project } from "./model.js";
 import { announce, failed } from "./notices.js";
 import { ParameterDrawer } from "./parameters.js";
@@ -37,7 +38,7 @@ async function start() {
   new Detail(project, view, [candidates, new Heuristics(project), new GraphWords(project)]);
   new Threshold(project, queue);
   new ParameterDrawer(project);
-  for (const part of [head, summary, exportMenu, inputs, loops, graphPanel, walkLink]) part(project, view);
+  for (const part of [head, summary, exportMenu, inputs, loops, mapTools, graphPanel, walkLink]) part(project, view);
   project.addEventListener("trouble", ({ detail }) => failed(detail));
   integrationLinks(byId("panel-map"), (id) => queue.select(id));
   keyboard();
@@ -133,7 +134,7 @@ function keyboard() {
   const act = (action) => () => view.act(action).catch(failed);
   const actions = { next: () => queue.turn(1), previous: () => queue.turn(-1), search, help };
   for (const name of ["accept", "reject"]) actions[name] = () => view.act(name, view.integration).catch(failed);
-  for (const name of ["skip", "undo", "redo", "toggle_dimension", "fit"]) actions[name] = act(name);
+  for (const name of ["skip", "undo", "redo", "toggle_dimension", "toggle_measuring", "fit"]) actions[name] = act(name);
   actions.stage = (number) => view.snapshot.stages && view.act("set_stage", view.snapshot.stages[number - 1]).catch(failed);
   for (const what of ["candidate", "heuristic", "stage"]) {
     for (const way of ["next", "previous"]) actions[`${way}_${what}`] = act(`${way}_${what}`);

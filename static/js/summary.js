@@ -2,20 +2,34 @@
 
 import { byId, fill, h } from "./dom.js";
 import { count, metres, whole } from "./format.js";
+import { failed } from "./notices.js";
 import { sentence } from "./problems.js";
 
 const LINES = 50;
 const EMPTY = "The map is empty: accept an integration, and its scans are merged.";
 
 /** Keep both lists up to date; what has not changed is left as it is, with its details open or closed. */
-export function summary(project) {
+export function summary(project, view) {
   const showMap = whenChanged(components);
   const showLogs = whenChanged(logs);
   project.addEventListener("info", () => {
-    const { components: parts, unplaced, merging, logs: files } = project.info;
-    showMap({ components: parts, unplaced, merging });
-    showLogs({ logs: files });
+    showMap(mapFacts(project, view));
+    showLogs({ logs: project.info.logs });
   });
+  view.addEventListener("changed", () => project.info && showMap(mapFacts(project, view)));
+  byId("components").addEventListener("click", (event) => act(event, view));
+}
+
+/** What the list of components shows; those of the view are theirs: colours, and which are hidden. */
+function mapFacts({ info }, { snapshot }) {
+  const { components: parts, unplaced, merging } = info;
+  const { colours = {}, hidden = [] } = snapshot.map ?? {};
+  return { components: parts, unplaced, merging, colours, hidden };
+}
+
+function act(event, view) {
+  const button = event.target.closest("[data-action]");
+  if (button) view.act(button.dataset.action, button.dataset.first).catch(failed);
 }
 
 function whenChanged(show) {
@@ -27,15 +41,26 @@ function whenChanged(show) {
   };
 }
 
-function components({ components: all, unplaced, merging }) {
+function components({ components: all, unplaced, merging, colours, hidden }) {
   const state = merging ? h("li.muted", {}, "The map is being computed…") : all.length === 0 && h("li.muted", {}, EMPTY);
-  fill(byId("components"), state, all.map(component), aloneItem(unplaced));
+  fill(byId("components"), state, all.map((one) => component(one, colours, hidden, all.length)), aloneItem(unplaced));
 }
 
-function component({ name, scans, segments, length }) {
+function component({ name, scans, segments, length }, colours, hidden, count_) {
+  const [first] = scans;
   const size = `${count(scans.length, "scan")}, ${count(segments, "segment")}, ${metres(length, 1)} of walls`;
-  const list = h("details", {}, h("summary", {}, `Scans ${scans[0]} to ${scans.at(-1)}`), h("p.ids", {}, scans.join(", ")));
-  return h("li", {}, h("h3", {}, name), h("p", {}, size), list);
+  const list = h("details", {}, h("summary", {}, `Scans ${first} to ${scans.at(-1)}`), h("p.ids", {}, scans.join(", ")));
+  const swatch = h("span.swatch", { "aria-hidden": "true" });
+  swatch.style.background = colours[first] ?? "transparent";
+  const shown = !hidden.includes(first);
+  const see = choice("toggle_component", first, shown ? "Hide" : "Show", `${shown ? "Hide" : "Show"} ${name} in the scene`);
+  const only = choice("isolate", first, shown && hidden.length ? "All" : "Only", `Show only ${name}, or all again`);
+  const tools = count_ > 1 ? h("span.row", {}, see, only) : null;
+  return h("li", { class: shown ? null : "off" }, h("h3", {}, swatch, name, tools), h("p", {}, size), list);
+}
+
+function choice(action, first, label, title) {
+  return h("button.quiet.small", { type: "button", "data-action": action, "data-first": first, "aria-label": title, title }, label);
 }
 
 function aloneItem(scans) {

@@ -400,10 +400,16 @@ def test_every_action_can_be_asked_for_by_name(view: View, clock: Clock) -> None
         "set_candidate": 1,
         "set_dimension": 3,
         "set_picked": {"source": "first", "segment": 0},
+        "set_colouring": "misfit",
+        "set_compare": "given",
+        "set_side": "over",
     }
     deciding = ("accept", "reject", "undo", "redo")
     for action in (*deciding, *(name for name in ACTIONS if name not in deciding)):
         clock.wait()
+        if action in ("toggle_component", "isolate"):
+            assert view.session.settle(PATIENCE)
+            values[action] = str(view.session.components()[0].scans[0])
         shown = view.act(action, values.get(action))
         assert json.loads(json.dumps(shown, allow_nan=False)) == shown
 

@@ -12,6 +12,7 @@ from segmap.export.record import Record
 from segmap.export.report.markup import Html, joined, tag
 from segmap.export.sheet import Place, Sheet, round_length
 from segmap.graph import GATE, Residual
+from segmap.merging import witnesses
 from segmap.pose import FloatArray, Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
@@ -35,7 +36,7 @@ def map_picture(components: Sequence[MapComponent]) -> Html:
 
 
 def _walls(segment_map: SegmentMap) -> Iterator[Html]:
-    seen = np.array([len({(s.log, s.scan) for s in sources}) for sources in segment_map.sources], int)
+    seen = witnesses(segment_map)
     for colour, those in ((MADE, seen == 0), (ONCE, seen == 1), (FIRM, seen > 1)):
         if those.any():
             yield _path(segment_map.coordinates[those], colour)
