@@ -10,7 +10,6 @@ from functools import cached_property
 from typing import Any
 
 from app.jobs import Check, Latest
-from app.pairs import are_neighbours
 from app.review import Fate
 from segmap.events import Covariance, Decision, IntegrationId
 from segmap.graph import Edge, Optimised, Preview, Residual, Strength, Ways, explain, optimise, preview, strength
@@ -74,26 +73,8 @@ class Solver:
         """The poses that fit the edges best; the same for the same edges."""
         with self._lock:
             if self._held is None or self._held[0] != edges:
-                self._held = edges, _best(edges, check)
+                self._held = edges, optimise(edges, check=check)
             return self._held[1]
-
-
-def _best(edges: tuple[Edge, ...], check: Check | None) -> Optimised:
-    """The better of two roads where something is silenced: from the surest edges, and from those of neighbours.
-
-    Who claims to be surer than everybody else would otherwise be believed first, and the others made to fit.
-    """
-    found = optimise(edges, check=check)
-    if not found.silenced:
-        return found
-    chains = optimise([one for one in edges if are_neighbours(one.first, one.second)], check=check)
-    longest = max(chains.components, key=len, default=())
-    other = optimise(edges, {scan: chains.poses[scan] for scan in longest}, check=check)
-    return min(found, other, key=_loss)
-
-
-def _loss(found: Optimised) -> float:
-    return sum(min(residual.chi, found.gate) ** 2 for residual in found.residuals)
 
 
 @dataclass(frozen=True, eq=False)

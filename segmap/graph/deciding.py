@@ -25,7 +25,8 @@ def decided(
 
     From a start whose errors are those of a chain, hearing silenced edges again, the surest first, finds the
     best place; where wrong edges went into the start, the rounds of graduated non-convexity do, ``begin``.
-    Poses that were given are relied on unless much is silenced from there.
+    Poses that were given are relied on unless much is silenced from there; those along the surest edges only
+    where nothing is: an edge that claims to be surer than all others may be wrong.
     """
     if not len(problem.free):
         return _plain(problem, minimise)
@@ -34,12 +35,20 @@ def decided(
     if (problem.edges.squares(agreed) <= problem.gate**2).all():
         problem.tell(Round(problem.loss(agreed), 0, agreed))
         return minimise(agreed, every, STEPS), every
-    found = [_from(problem, start, minimise) for start in (problem.starts[0], begin(problem.starts[0]))]
-    if len(problem.starts) > 1 and min(_silenced(weights) for _, weights in found) > MANY * len(problem.free):
-        others = problem.starts[-1], begin(problem.starts[-1])
-        found += [_from(problem, start, minimise) for start in others]
+    found = _both(problem, problem.starts[0], minimise, begin)
+    bearable = MANY * len(problem.free) if problem.given else 0.0
+    for start in problem.starts[1:]:
+        if min(_silenced(weights) for _, weights in found) > bearable:
+            found += _both(problem, start, minimise, begin)
     poses, weights = min(found, key=lambda one: problem.loss(one[0]))
     return minimise(poses, weights, STEPS), weights
+
+
+def _both(
+    problem: Problem, start: FloatArray, minimise: Minimise, begin: Callable[[FloatArray], FloatArray]
+) -> list[tuple[FloatArray, FloatArray]]:
+    """What the two roads find from a start."""
+    return [_from(problem, poses, minimise) for poses in (start, begin(start))]
 
 
 def _from(problem: Problem, poses: FloatArray, minimise: Minimise) -> tuple[FloatArray, FloatArray]:

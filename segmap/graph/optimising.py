@@ -16,7 +16,7 @@ from segmap.graph.edges import Edge, components
 from segmap.graph.least_squares import LeastSquares
 from segmap.graph.optimised import Iteration, Optimised, Residual
 from segmap.graph.robust import Problem, Round, graduated
-from segmap.graph.start import first_poses
+from segmap.graph.start import along_logs, first_poses
 from segmap.graph.with_gtsam import Gtsam
 from segmap.pose import FloatArray, Pose2
 from segmap.scans import ScanId
@@ -97,7 +97,8 @@ def _solved(
     starts = [first_poses(scans, edges, initial)] if any(scan in initial for scan in scans) else []
     problem = Problem(
         edges=arrays,
-        starts=(*starts, first_poses(scans, edges)),
+        starts=(*starts, first_poses(scans, edges), first_poses(scans, edges, doubt=along_logs)),
+        given=bool(starts),
         free=np.array([i for i, edge in enumerate(edges) if gate is not None and not edge.trusted], np.int64),
         gate=gate or np.inf,
         tell=rounds.append,

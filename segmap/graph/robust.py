@@ -61,7 +61,9 @@ class Problem:
 
     edges: EdgeArrays
     starts: tuple[FloatArray, ...]
-    """poses (n, 3) to begin from; the last are those along the most reliable edges, those before were given"""
+    """poses (n, 3) to begin from: those that were given, along the surest edges, along the edges nearest in the logs"""
+    given: bool
+    """whether the first were"""
     free: IntArray
     """the edges that can be silenced"""
     gate: float

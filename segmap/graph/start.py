@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from segmap.graph.edges import Edge, Parts
 from segmap.pose import FloatArray, Pose2
 from segmap.scans import ScanId
 
-__all__ = ["first_poses", "uncertainty"]
+__all__ = ["along_logs", "first_poses", "uncertainty"]
 
 ARM = 5.0
 """metres; how far from a scan an error of its heading is felt"""
@@ -22,18 +24,30 @@ def uncertainty(edge: Edge) -> float:
     return edge.covariance[0][0] + edge.covariance[1][1] + ARM**2 * edge.covariance[2][2]
 
 
+def along_logs(edge: Edge) -> tuple[float, float]:
+    """How little an edge can be relied on whatever it says of itself: scans near each other in a log seldom mislead.
+
+    Between logs, and among edges as far apart, the surest can be relied on most.
+    """
+    steps = abs(edge.second.scan - edge.first.scan) if edge.first.log == edge.second.log else math.inf
+    return steps, uncertainty(edge)
+
+
 def first_poses(
-    scans: Sequence[ScanId], edges: Sequence[Edge], initial: Mapping[ScanId, Pose2] | None = None
+    scans: Sequence[ScanId],
+    edges: Sequence[Edge],
+    initial: Mapping[ScanId, Pose2] | None = None,
+    doubt: Callable[[Edge], Any] = uncertainty,
 ) -> FloatArray:
     """Poses (n, 3) of the scans of one component in the frame of the first.
 
     ``initial`` poses are taken; what lacks one is composed along a spanning tree: trusted edges first, then
-    the surest.
+    those of the least ``doubt``, as a rule the surest.
     """
     initial = initial or {}
     places = {scan: place for place, scan in enumerate(scans)}
     links: list[list[tuple[int, Pose2]]] = [[] for _ in scans]
-    for edge in _tree(edges, places, initial):
+    for edge in _tree(edges, places, initial, doubt):
         a, b = places[edge.first], places[edge.second]
         links[a].append((b, edge.T_1_2))
         links[b].append((a, edge.T_1_2.inverse()))
@@ -42,13 +56,18 @@ def first_poses(
     return _in_first_frame(np.array([tuple(poses[place]) for place in range(len(scans))]))
 
 
-def _tree(edges: Sequence[Edge], places: Mapping[ScanId, int], initial: Mapping[ScanId, Pose2]) -> list[Edge]:
+def _tree(
+    edges: Sequence[Edge],
+    places: Mapping[ScanId, int],
+    initial: Mapping[ScanId, Pose2],
+    doubt: Callable[[Edge], Any],
+) -> list[Edge]:
     """Edges that reach every scan from those with initial poses, without a loop."""
     parts = Parts(len(places))
     held = [places[scan] for scan in initial if scan in places]
     for place in held[1:]:
         parts.join(held[0], place)
-    ordered = sorted(edges, key=lambda edge: (not edge.trusted, uncertainty(edge)))
+    ordered = sorted(edges, key=lambda edge: (not edge.trusted, doubt(edge)))
     return [edge for edge in ordered if parts.join(places[edge.first], places[edge.second])]
 
 

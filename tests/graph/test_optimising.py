@@ -80,6 +80,18 @@ def test_trusted_edges_are_never_silenced():
     assert silenced(doubted) == [False] * len(edges) + [True]
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_who_claims_to_be_surer_than_all_others_is_not_believed_for_that(seed):
+    """A wrong closure whose variances are a ten-thousandth of the others' is silenced, alone, without a first guess."""
+    _, edges = ring(40, trusted=False, seed=seed, reach=1)
+    kept = [edge for edge in edges if edge.second.scan - edge.first.scan == 1 or edge.first.scan % 4 == 0]
+    sure = tuple(tuple(1e-4 * number for number in row) for row in COVARIANCE)
+    wrong = [Edge(ScanId(0, a), ScanId(0, b), Pose2(0.5 + a, 2.0, 1.0), sure) for a, b in ((3, 17), (12, 30))]
+    clean, result = optimise(kept), optimise([*kept, *wrong])
+    assert silenced(result) == [False] * len(kept) + [True, True]
+    assert same(result.poses, clean.poses)
+
+
 def test_without_the_robust_kernel_everything_counts():
     """Plain least squares silences nothing, and wrong closures move the map."""
     _, edges = ring(40)
