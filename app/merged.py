@@ -11,6 +11,7 @@ from app.resources import program_version
 from app.review import THRESHOLDS
 from segmap.errors import CancelledError, ExportError, ProjectError, SegmapError
 from segmap.export import RESOLUTION, Content, Record
+from segmap.graph import Edge
 from segmap.merging import Component, map_hash, merge_accepted
 from segmap.parameters import Parameters
 from segmap.project import ProjectState
@@ -32,6 +33,8 @@ class Merged:
     parameters: Parameters | None = None
     integrations: tuple[str, ...] = ()
     """the accepted ones it was made of"""
+    edges: tuple[Edge, ...] = ()
+    """of them those that the optimiser believes, with their covariances"""
 
 
 def map_parameters(parameters: Parameters) -> Parameters:
@@ -62,7 +65,8 @@ def merge_project(
     reusable = previous.components if previous and previous.parameters == parameters else ()
     components = merge_accepted(maps, placed(edges, optimised), state.parameters, previous=reusable, check=check)
     integrations = tuple(edge.name for edge in edges)
-    return Merged(state.revision, components, map_hash(components), parameters, integrations)
+    believed = tuple(residual.edge for residual in optimised.residuals if not residual.silenced)
+    return Merged(state.revision, components, map_hash(components), parameters, integrations, believed)
 
 
 def exportable(
@@ -90,8 +94,12 @@ def exportable(
         "revision": str(merged.revision),
         "parameters": state.fingerprint,
     }
+    if silenced := len(merged.integrations) - len(merged.edges):
+        told["silenced"] = f"{silenced} accepted integrations that the others contradict: no edges of a pose graph"
     times = {scan: time_of(scan) for component in merged.components for scan in component.scans}
-    return Content(merged.components, told, merged.integrations, times, stem, resolution, record=record)
+    return Content(
+        merged.components, told, merged.integrations, times, stem, resolution, edges=merged.edges, record=record
+    )
 
 
 class MergedMap:

@@ -55,7 +55,9 @@ def map_logs(
     parts = fused(whole, maps, by.parameters)
     title = ", ".join(log.name for log in laser_logs)
     about = described(title, map_hash(parts))
-    content = Content(parts, about, [f"{link.first}-{link.second}" for link in whole.links], times_of(laser_logs))
+    names = [f"{link.first}-{link.second}" for link in whole.links]
+    believed = [residual.edge for residual in whole.optimised.residuals if not residual.silenced]
+    content = Content(parts, about, names, times_of(laser_logs), edges=believed)
     for path in out or []:
         write_files(content, path)
     if trajectory is not None:

@@ -29,7 +29,7 @@ from app.cli.options import (
     topic_of,
 )
 from app.cli.output import pose_json, print_json, print_table, progress
-from app.cli.writing import described, listed, new_project, times_of, write_trajectory
+from app.cli.writing import described, edges_between, listed, new_project, times_of, write_trajectory
 from segmap.errors import ParameterError, ProjectError
 from segmap.events import IntegrationId
 from segmap.export import Content, by_suffix, write_files
@@ -86,7 +86,8 @@ def merge(
     task = _Task([log for _, log in sources], by, method, stride)
     task.check_calls(most_calls)
     merged = task.merged(close, clean)
-    content = Content(merged.components, merged.about, list(map(str, merged.accepted)), times_of(task.logs))
+    names, edges = list(map(str, merged.accepted)), edges_between(merged.accepted)
+    content = Content(merged.components, merged.about, names, times_of(task.logs), edges=edges)
     for path in out or []:
         write_files(content, path)
     if trajectory is not None:

@@ -10,18 +10,20 @@ import typer
 
 from app.cli.options import Method
 from app.inputs import facts_of, remember
+from app.posegraph import edge
 from app.resources import program_version
 from segmap.errors import LogError
-from segmap.events import Choice, Decide, IntegrationId, fingerprint
+from segmap.events import Choice, Covariance, Decide, IntegrationId, fingerprint
 from segmap.export import Content, write_files
 from segmap.export.tum import left_out
+from segmap.graph import Edge
 from segmap.integration import Match
 from segmap.links import covariance_of
 from segmap.parameters import Parameters
 from segmap.scans import LaserLog, ScanId
 from segmap.store import Store
 
-__all__ = ["described", "listed", "new_project", "times_of", "write_trajectory"]
+__all__ = ["described", "edges_between", "listed", "new_project", "times_of", "write_trajectory"]
 
 COMMAND = "segmap merge"
 """who decided, in the history of a project"""
@@ -47,6 +49,16 @@ def write_trajectory(path: Path, content: Content) -> None:
 def times_of(logs: Sequence[LaserLog]) -> dict[ScanId, float | None]:
     """When each scan of some logs was taken, seconds."""
     return {ScanId(number, i): scan.time for number, log in enumerate(logs) for i, scan in enumerate(log)}
+
+
+def edges_between(accepted: Mapping[IntegrationId, Match]) -> list[Edge]:
+    """Accepted integrations as edges of a pose graph."""
+    return [edge(str(pair), match.T_1_2, _covariance(match)) for pair, match in accepted.items() if match.T_1_2]
+
+
+def _covariance(match: Match) -> Covariance | None:
+    known = match.best is not None and match.best.uncertainty is not None
+    return covariance_of(match.best) if known and match.best is not None else None
 
 
 def new_project(
@@ -84,5 +96,5 @@ def _choice(integration: IntegrationId, match: Match, parameters: Parameters) ->
         heuristic=match.heuristic,
         mode=match.mode,
         candidate=0,
-        covariance=None if match.best is None or match.best.uncertainty is None else covariance_of(match.best),
+        covariance=_covariance(match),
     )

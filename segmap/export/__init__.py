@@ -15,6 +15,7 @@ from segmap.errors import ExportError
 from segmap.export.components import RESOLUTION, Content, ExportFormat, Files, MapComponent
 from segmap.export.dxf import DXF
 from segmap.export.files import packed, write_whole
+from segmap.export.g2o import G2O
 from segmap.export.geojson import GEOJSON
 from segmap.export.png import PNG
 from segmap.export.record import LogTold, PairTold, Record
@@ -45,7 +46,7 @@ __all__ = [
 ]
 
 FORMATS: dict[str, ExportFormat] = {
-    format.name: format for format in (ROS_MAP, DXF, SVG, PNG, GEOJSON, CSV, TUM, REPORT)
+    format.name: format for format in (ROS_MAP, DXF, SVG, PNG, GEOJSON, CSV, TUM, G2O, REPORT)
 }
 """Every format written, by name."""
 

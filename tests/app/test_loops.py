@@ -213,6 +213,39 @@ def replace_id(claim: Proposal, integration: str, session: Session) -> Proposal:
     return claim.model_copy(update={"integration": integration, "T_1_2": T})
 
 
+def test_the_graph_opens_in_gtsam(session: Session, project_file: Path, tmp_path: Path, run: Any) -> None:
+    """What is accepted and believed, with its covariances and time stamps beside it: gtsam sees the same errors."""
+    gtsam = pytest.importorskip("gtsam", reason="gtsam is not installed: pip install 'segmap[graph]'")
+    session.configure({}, mode="verified")
+    assert session.settle(PATIENCE)
+    accept_all(session)
+    session.propose(manual(FAR, FARTHER))
+    assert session.settle(PATIENCE)
+    accept_all(session)
+    session.propose([replace_id(wrong(session, FAR), "0.0-0.5", session)])
+    assert session.settle(PATIENCE)
+    match = session.match("0.0-0.5")
+    assert match is not None
+    session.decide(["0.0-0.5"], "accepted", candidate=len(match.ranked) - 1)
+    assert session.settle(PATIENCE)
+    graph = session.loops.graph
+    assert [one.edge.name for one in graph.optimised.silenced] == ["0.0-0.5"]
+    target = tmp_path / "curated.g2o"
+    assert run("export", project_file, "--to", "g2o", "--out", target) == (0, "", "")
+    theirs, values = gtsam.readG2o(str(target), False)
+    assert (theirs.size(), values.size()) == (8, 7)
+    for scan, pose in graph.optimised.poses.items():
+        found = values.atPose2(scan.scan)
+        assert (found.x(), found.y(), found.theta()) == pytest.approx(tuple(pose), abs=1e-9)
+    errors = sorted(2.0 * theirs.at(i).error(values) for i in range(theirs.size()))
+    believed = [one for one in graph.optimised.residuals if not one.silenced]
+    assert errors == pytest.approx(sorted(one.chi**2 for one in believed), rel=1e-6, abs=1e-9)
+    assert "1 accepted integrations that the others contradict" in target.read_text()
+    stamps = (tmp_path / "curated.times.csv").read_text().splitlines()
+    assert stamps[0] == "id,log,scan,time"
+    assert [row.split(",")[3] for row in stamps[1:]] == [f"{session.scan(scan).time:.6f}" for scan in session.scan_ids]
+
+
 def test_the_strength_of_a_component_is_told(session: Session) -> None:
     """A chain is all bridges; a closure takes them away from the scans it goes round."""
     accept_all(session)

@@ -56,7 +56,7 @@ def test_write(corner, tmp_path):
         assert path.read_bytes() == next(iter(export_files(Content([corner], {"title": "T"}), name).values()))
     write_map([corner], tmp_path / "map.txt", "svg")
     names = {f"map{format.suffix.upper()}" for format in FORMATS.values()}
-    assert {path.name for path in tmp_path.iterdir()} == {*names, "map.pgm", "map.txt"}
+    assert {path.name for path in tmp_path.iterdir()} == {*names, "map.pgm", "map.times.csv", "map.txt"}
 
 
 def test_write_refused(corner, tmp_path):
