@@ -23,8 +23,8 @@ __all__ = ["Consensus", "voted"]
 
 LEAST_VOTES, LEAST_SCORE, LEAST_LEAD = 2, 6.0, 0.1
 """pairs that must agree, the metres all must score together, and the share of it they must be ahead of any rival"""
-RIVAL = 1.2
-"""times as far apart as ways that say the same: from here on it is another transformation"""
+RIVAL = 2.0
+"""times as far apart as ways that say the same: from here on it is a rival; of those nearer by, votes choose"""
 MOST_CENTRES = 60
 """votes that are tried as the middle of a cluster"""
 MOST_JUDGED = 10
@@ -55,7 +55,7 @@ class Consensus:
     needed: int
     """pairs that must agree: fewer where a group is a single scan"""
     score: float
-    """metres: what pairs voted, and what the lines of sight of all pairs say of it, support less conflict"""
+    """metres: what the lines of sight of all pairs say of it, support less conflict"""
     lead: float
     """share of the score by which it is ahead of every distinct other, however severely conflict is judged"""
 
@@ -77,7 +77,8 @@ def voted(
 
     Groups are given by the poses of their scans in a frame of each. Each pair votes for what each of its
     candidates implies, where that is ``allowed``; what has most votes is judged by them and by the lines of sight
-    of all pairs, also those that voted for something else.
+    of all pairs, also those that voted for something else. How far it leads, lines of sight alone say: votes of
+    many pairs along one corridor err together.
     """
     cast = sorted(_votes(group_1, group_2, matches, allowed), key=lambda vote: -vote.weight)
     clusters: list[tuple[float, Pose2, tuple[Vote, ...]]] = []
@@ -90,9 +91,9 @@ def voted(
     if not judged:
         return None
     totals = np.array([_joint(group_1, group_2, T_1_2, seen, parameters) for _, T_1_2, _ in judged])
-    votes_for = np.array([[weight] for weight, _, _ in judged])
-    scores = votes_for + totals[:, :1] - totals[:, 1:] * SEVERITIES
-    best = int(np.argmax(scores.mean(axis=1)))
+    votes_for = np.array([weight for weight, _, _ in judged])
+    scores = totals[:, :1] - totals[:, 1:] * SEVERITIES
+    best = int(np.argmax(votes_for + scores.mean(axis=1)))
     apart = [k for k, (_, T_1_2, _) in enumerate(judged) if not alike(T_1_2, judged[best][1], RIVAL)]
     rivals = scores[apart].max(axis=0, initial=0.0)
     leads = np.where(scores[best] > 0.0, 1.0 - rivals / np.maximum(scores[best], LEAST_SCORE), 0.0)

@@ -9,8 +9,9 @@ from itertools import combinations, groupby, pairwise, product
 import numpy as np
 
 from segmap.fusion import fuse_all
-from segmap.graph import Optimised, components, optimise
+from segmap.graph import Optimised, optimise
 from segmap.graph.edges import Parts
+from segmap.holding import weakly_held
 from segmap.integration import Match
 from segmap.keyframes import chained
 from segmap.links import Link, Pace
@@ -35,8 +36,6 @@ from segmap.spreading import Crew, Keep, Matches, Pair, Told
 
 __all__ = ["WholeMap", "fused", "map_scans"]
 
-FIRM = ("accepted", "agreed", "closed", "tracked")
-"""links that bear a place out"""
 ROUNDS = 3
 """searches for closures, each from the poses the one before gave"""
 MOST_JOINING = 800
@@ -73,29 +72,9 @@ class WholeMap:
         return tuple(sorted(self.optimised.components, key=lambda part: (-len(part), part)))
 
     def weakly_held(self) -> dict[ScanId, str]:
-        """The scans whose place is not borne out by a verdict, and why: to be looked at by a person.
-
-        Parts of a component that hang together by accepted matches, but hang on the rest only by what neighbours
-        agreed on or what fits the robot's pace, may be where they are or not.
-        """
-        firm = [link for link, fate in zip(self.links, self.optimised.residuals, strict=True) if not fate.silenced]
-        parts = components([link.edge for link in firm if link.why in FIRM], self.poses)
-        home = {scan for whole in _blocks(parts, self.components) for scan in max(whole, key=len)}
-        return {
-            scan: f"{len(part)} scans from {part[0]} on hang on the rest by no accepted integration."
-            for part in parts
-            for scan in part
-            if scan not in home
-        }
-
-
-def _blocks(parts: Sequence[Sequence[ScanId]], wholes: Sequence[Sequence[ScanId]]) -> list[list[Sequence[ScanId]]]:
-    """The parts of each whole."""
-    number = {scan: i for i, whole in enumerate(wholes) for scan in whole}
-    blocks: list[list[Sequence[ScanId]]] = [[] for _ in wholes]
-    for part in parts:
-        blocks[number[part[0]]].append(part)
-    return blocks
+        """The scans whose place one doubtful step decides, and why: see :func:`segmap.holding.weakly_held`."""
+        sound = [link for link, fate in zip(self.links, self.optimised.residuals, strict=True) if not fate.silenced]
+        return weakly_held(sound, self.components)
 
 
 def map_scans(

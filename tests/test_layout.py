@@ -55,6 +55,7 @@ ORDER = (
     "consensus",
     "keyframes",
     "loops",
+    "holding",
     "mapping",
     "revisits",
     "events",

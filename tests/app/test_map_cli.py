@@ -60,7 +60,7 @@ def test_without_json_it_tells_a_person(run: Run, monkeypatch: pytest.MonkeyPatc
         return whole
 
     monkeypatch.setattr("app.cli.mapping.map_scans", doubted)
-    monkeypatch.setattr("segmap.mapping.FIRM", ("tracked",))
+    monkeypatch.setattr("segmap.holding.FIRM", ("tracked",))
     status, out, _ = run("map", samples_folder() / "hall.log", "--workers", 1)
     assert status == 0
     count = len(held["whole"].scans)
