@@ -116,7 +116,7 @@ class Subject:
         if self.merging:
             return walk_merge(self._maps(), self.parameters, self.heuristic, self.mode, self.title)
         one, other = (self.scan(scan) for scan in self.scans)
-        return walk_scans(one, other, self.parameters, self.heuristic, self.mode, self.title)
+        return walk_scans(one, other, self.parameters, self.heuristic, self.mode, self.title, self.truth)
 
     def pair_under(self, parameters: Parameters) -> tuple[SegmentMap, SegmentMap]:
         """The two maps of a pair under some parameters."""

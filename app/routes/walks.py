@@ -9,6 +9,7 @@ from fastapi import APIRouter, Path, Query
 from fastapi.responses import FileResponse, Response
 
 from app.errors import RequestError, UnknownError
+from app.lesson import lesson_document
 from app.resources import static_folder
 from app.routes.common import Site
 from app.routes.projects import attached
@@ -39,6 +40,12 @@ class AskedSteps(AskedStage):
 def walk_page() -> FileResponse:
     """The player."""
     return FileResponse(static_folder() / "walk.html")
+
+
+@router.get("/api/lesson")
+def lesson() -> dict[str, Any]:
+    """The stops of the guided lesson, each with the address of its view."""
+    return lesson_document()
 
 
 @router.get("/api/walk")

@@ -10,7 +10,7 @@ import numpy as np
 from segmap.candidates import Candidates
 from segmap.evaluation import best, evaluate
 from segmap.parameters import Parameters
-from segmap.pose import FloatArray, IntArray, Pose2
+from segmap.pose import FloatArray, IntArray, Pose2, wrap
 from segmap.segments import SegmentMap
 from segmap.tracing import Trace
 from segmap.walkthrough.steps import Box, around
@@ -19,6 +19,8 @@ __all__ = ["Found"]
 
 STOPS = 60
 """stops of a stage with more steps than anybody wants to watch"""
+ARM, REACH = 2.0, 0.5
+"""metres: what a radian counts as, and how far from the truth a candidate may be to stand for it"""
 POINTS = 240
 """points of a chart over all candidates"""
 
@@ -97,6 +99,15 @@ class Found:
         """The best candidate by value, the first of equals; None where none has a value."""
         top = best(self.values, 1)
         return int(top[0]) if len(top) else None
+
+    def nearest(self, truth: Pose2) -> int | None:
+        """The candidate nearest to a pose among those not discarded; None where none is within reach of refinement."""
+        alive = np.flatnonzero(~np.isnan(self.values))
+        if not len(alive):
+            return None
+        apart = self.held.poses[alive] - np.array(tuple(truth))
+        far = np.hypot(apart[:, 0], apart[:, 1]) + ARM * np.abs(wrap(apart[:, 2]))
+        return int(alive[np.argmin(far)]) if far.min() < REACH else None
 
     @cached_property
     def discarded(self) -> IntArray:

@@ -15,7 +15,21 @@ from segmap.parameters import Parameters
 from segmap.pose import FloatArray, IntArray, Pose2
 from segmap.segments import SegmentMap
 from segmap.tracing import Event, Trace
-from segmap.walkthrough.steps import CHAINS, Box, Mark, Quantity, Shape, Stage, Step, around, lines, metres, of, path
+from segmap.walkthrough.steps import (
+    CHAINS,
+    Box,
+    Mark,
+    Quantity,
+    Shape,
+    Stage,
+    Step,
+    around,
+    degrees,
+    lines,
+    metres,
+    of,
+    path,
+)
 
 __all__ = ["chains_stage", "polylines_stage", "result_stage"]
 
@@ -227,11 +241,18 @@ def _first_run(trace: Trace) -> list[Event]:
 
 
 def result_stage(
-    match: Match, fusion: Fusion | None, maps: tuple[SegmentMap, SegmentMap], parameters: Parameters, box: Box | None
+    match: Match,
+    fusion: Fusion | None,
+    maps: tuple[SegmentMap, SegmentMap],
+    parameters: Parameters,
+    box: Box | None,
+    truth: Pose2 | None = None,
 ) -> Stage:
     """What stays as it is, what the polylines add, spurious doubles, and the verdict in words."""
     steps = [_unmatched(match, maps), _fused(fusion), _spurious(fusion)] if fusion else []
-    steps.append(_verdict(match, maps, fusion, parameters))
+    steps.append(_verdict(match, fusion, parameters))
+    if truth is not None:
+        steps.append(_true_place(match, truth, "13" if fusion else "3"))
     marks = (Mark(2, "doubled walls (Fig. 7)"),) if fusion else ()
     return Stage(
         id="result",
@@ -241,7 +262,7 @@ def result_stage(
         algorithm="result" if not fusion else "5",
         count=len(steps),
         step=lambda k: steps[k],
-        marks=(*marks, Mark(len(steps) - 1, "the verdict")),
+        marks=(*marks, Mark(3 if fusion else 0, "the verdict")),
         box=box,
         figure="Fig. 7" if fusion else "",
     )
@@ -283,8 +304,22 @@ def _spurious(fusion: Fusion) -> Step:
     return Step("12", say, shapes, (metres("doubled walls", length, 2), ("share", f"{100 * share:.1f}", "%")))
 
 
-def _verdict(match: Match, maps: tuple[SegmentMap, SegmentMap], fusion: Fusion | None, parameters: Parameters) -> Step:
-    del maps
+def _true_place(match: Match, truth: Pose2, line: str) -> Step:
+    """Where map 2 really is, for samples whose truth is known."""
+    shapes = (of("first", "first", width=2.5), of("second", "good", pose=truth, width=2.5))
+    found = match.T_1_2
+    if found is None:
+        return Step(line, "The truth, which only the simulator knows: here map 2 (green) really lies.", shapes)
+    off, turned = found.distance(truth)
+    say = (
+        "The truth, which only the simulator knows: here map 2 (green) really lies. What was found is"
+        f" {off:.2f} m and {np.degrees(turned):.1f}° from it."
+    )
+    told = (metres("off the truth", off, 2), degrees("turned off the truth", turned))
+    return Step(line, say, (*shapes, of("second", "faint", pose=found)), told)
+
+
+def _verdict(match: Match, fusion: Fusion | None, parameters: Parameters) -> Step:
     told: list[Quantity] = [metres("value", match.value), metres("value_threshold", parameters.value_threshold, 2)]
     if match.confidence is not None:
         told.append(("confidence", f"{100.0 * match.confidence:.1f}", "%"))

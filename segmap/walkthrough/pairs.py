@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from segmap import tracing
 from segmap.integration import Integration, integrate
 from segmap.parameters import Parameters
+from segmap.pose import Pose2
 from segmap.scans import LaserScan
 from segmap.segments import SegmentMap, extract
 from segmap.tracing import Trace
@@ -37,8 +38,11 @@ def walk_scans(
     heuristic: str | None = None,
     mode: str = "paper",
     title: str = "",
+    truth: Pose2 | None = None,
 ) -> PairWalk:
     """A walkthrough of two scans, their points and how they become segments included.
+
+    ``truth``, ``T_1_2`` where it is known, is shown at the end and never used.
 
     Raises:
         ParameterError: there is no such heuristic or mode.
@@ -47,7 +51,7 @@ def walk_scans(
     with tracing.recording() as trace:
         maps = extract(scan_1, parameters, index=0), extract(scan_2, parameters, index=1)
     points = [points_stage(which, event, parameters) for which, event in enumerate(trace.all("segments"), start=1)]
-    return _walk(maps, points, parameters, heuristic, mode, title)
+    return _walk(maps, points, parameters, heuristic, mode, title, truth)
 
 
 def walk_maps(
@@ -72,14 +76,17 @@ def _walk(
     heuristic: str | None,
     mode: str,
     title: str,
+    truth: Pose2 | None = None,
 ) -> PairWalk:
     with tracing.recording() as trace:
         integration = integrate(*maps, parameters, heuristic, mode)
     found = Found.of(trace, *maps, parameters)
-    stages = [*points, *_stages(trace, maps, integration, found, parameters)]
+    stages = [*points, *_stages(trace, maps, integration, found, truth)]
 
     def more(id: str) -> Stage | None:
         number = id.removeprefix(PAIRS)
+        if number == "best" and found.best is not None:
+            return pairs_stage(found, found.best)
         inside = id.startswith(PAIRS) and number.isdecimal() and len(number) < 10 and 1 <= int(number) <= len(found)
         return pairs_stage(found, int(number) - 1) if inside else None
 
@@ -92,12 +99,12 @@ def _stages(
     maps: tuple[SegmentMap, SegmentMap],
     integration: Integration,
     found: Found,
-    parameters: Parameters,
+    truth: Pose2 | None,
 ) -> list[Stage]:
-    match = integration.match
+    match, parameters = integration.match, found.parameters
     stages = [*angles_stages(trace, parameters), *draws_stage(trace, maps, parameters)]
     if len(found):
-        stages += [candidates_stage(found), evaluation_stage(found, match.mode)]
+        stages += [candidates_stage(found), evaluation_stage(found, match.mode, truth)]
     if found.best is not None:
         stages.append(pairs_stage(found, found.best))
     if match.T_1_2 is not None:
@@ -105,4 +112,4 @@ def _stages(
         known_as = "The refined candidate" if match.mode != "paper" else "The best candidate"
         stages += sight_stage(maps, match.T_1_2, parameters, found.box, known_as)
         stages += [*chains_stage(trace, maps, found.box), *polylines_stage(trace, parameters)]
-    return [*stages, result_stage(match, integration.fusion, maps, parameters, found.box)]
+    return [*stages, result_stage(match, integration.fusion, maps, parameters, found.box, truth)]

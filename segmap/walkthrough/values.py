@@ -8,9 +8,23 @@ import numpy as np
 
 from segmap.explanation import Explanation, PairTerm, explain, measured
 from segmap.parameters import Parameters
-from segmap.pose import FloatArray
+from segmap.pose import FloatArray, Pose2
 from segmap.walkthrough.found import Found
-from segmap.walkthrough.steps import CHAINS, Mark, Quantity, Shape, Stage, Step, around, lines, metres, of, points, text
+from segmap.walkthrough.steps import (
+    CHAINS,
+    Mark,
+    Quantity,
+    Shape,
+    Stage,
+    Step,
+    around,
+    degrees,
+    lines,
+    metres,
+    of,
+    points,
+    text,
+)
 
 __all__ = ["PAIRS", "evaluation_stage", "pairs_stage"]
 
@@ -24,12 +38,15 @@ PENALTY_CURVE = 40
 # --- candidate by candidate -------------------------------------------------------------------------
 
 
-def evaluation_stage(found: Found, mode: str) -> Stage:
+def evaluation_stage(found: Found, mode: str, truth: Pose2 | None = None) -> Stage:
     """Every candidate with its value, or why it is discarded, and the best so far."""
     marks = [Mark(int(k) + 1, f"best so far: candidate {int(k) + 1}") for k in found.improvements[-IMPROVEMENTS:]]
     marks += [Mark(int(k) + 1, "the first candidate that is discarded") for k in found.discarded[:1]]
     if found.best is not None:
         marks.append(Mark(found.best + 1, "the moment the best candidate was found"))
+    nearest = None if truth is None else found.nearest(truth)
+    if nearest is not None:
+        marks.append(Mark(nearest + 1, "the candidate nearest to the truth"))
     more = " In verified mode what decides between the best of them is their lines of sight." * (mode != "paper")
     return Stage(
         id="evaluation",
@@ -38,7 +55,7 @@ def evaluation_stage(found: Found, mode: str) -> Stage:
         f" moved as the candidate says. The candidate of the highest value wins.{more}",
         algorithm="4",
         count=len(found) + 1,
-        step=lambda k: _beginning(found) if k == 0 else _valued(found, k - 1),
+        step=lambda k: _beginning(found) if k == 0 else _valued(found, k - 1, truth),
         marks=(Mark(0, "the idea"), *sorted(marks, key=lambda mark: mark.index)),
         stops=found.spread(),
         box=found.box,
@@ -58,7 +75,7 @@ def _beginning(found: Found) -> Step:
     return Step("1", say, shapes, (*told, ("with a value", str(alive), "")))
 
 
-def _valued(found: Found, k: int) -> Step:
+def _valued(found: Found, k: int, truth: Pose2 | None) -> Step:
     told = explain(found.map_1, found.map_2, found.pose(k), found.parameters, sights=False)
     value, before = float(found.values[k]), float(found.running[k - 1]) if k else 0.0
     enter = {"label": "Look at this candidate pair by pair", "stage": f"{PAIRS}{k + 1}"}
@@ -82,6 +99,9 @@ def _valued(found: Found, k: int) -> Step:
         metres("best so far", float(found.running[k])),
         ("matching pairs of segments", str(sum(pair.chain is not None for pair in told.pairs)), ""),
     )
+    if truth is not None:
+        off, turned = found.pose(k).distance(truth)
+        numbers += (metres("off the truth", off, 2), degrees("turned off the truth", turned))
     return Step(line, say, tuple(_matched(told, found, k)), numbers, at=at, enter=enter)
 
 

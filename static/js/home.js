@@ -10,6 +10,7 @@ import { dropZone } from "./upload.js";
 dropZone(byId("drop"), open);
 show(byId("projects"), listProjects);
 show(byId("samples"), listSamples);
+show(byId("lesson"), listStops);
 byId("project-new").addEventListener("click", () => create(open));
 addEventListener("pageshow", (event) => event.persisted && refresh());
 
@@ -43,6 +44,11 @@ async function listProjects() {
 async function listSamples() {
   const { samples } = await get("/api/samples");
   return samples.length ? samples.map((sample) => sampleCard(sample, openSample)) : [h("li.muted", {}, "No samples are installed.")];
+}
+
+async function listStops() {
+  const { stops } = await get("/api/lesson");
+  return stops.map(({ title, say, url }) => h("li", { title: say }, h("a", { href: url }, title)));
 }
 
 async function openSample(name) {

@@ -8,6 +8,7 @@ import zipfile
 import pytest
 from PIL import Image
 
+from app.lesson import LESSON
 from app.resources import samples_folder, static_folder
 from app.walk_pictures import ROLES
 from segmap.candidates import PAPER_HEURISTICS
@@ -162,3 +163,39 @@ def test_race_and_sweep(client):
     assert tries == sorted(tries), "a larger tolerance lets more candidates in"
     assert client.get("/api/walk/sweep", params={**HALL, "parameter": "magic"}).status_code == 400
     assert client.get("/api/walk/race", params={"sample": "hall", "merge": "0.0-0.3"}).status_code == 400
+
+
+def test_each_stop_of_the_lesson_restores_a_view(client):
+    """Every address leads to a stage that exists and to the step that is meant, a mark by its label."""
+    stops = client.get("/api/lesson").json()["stops"]
+    assert 10 <= len(stops) <= 15
+    for stop in LESSON:
+        assert str(stop.url(1)) in {**stops[0], "url": stop.url(1)}["url"]
+        held = client.get("/api/walk/stage", params={**stop.asked, "stage": stop.stage})
+        assert held.status_code == 200, stop.title
+        assert stop.step in [label for _, label in held.json()["marks"]], stop.title
+
+
+def test_the_lesson_tells_the_truth(client):
+    """The corridor's best value is wrong by metres and verified mode right; the tree doubles more than the pivot."""
+
+    def step_of(title):
+        stop = next(stop for stop in LESSON if stop.title == title)
+        asked = {**stop.asked, "stage": stop.stage}
+        marks = client.get("/api/walk/stage", params=asked).json()["marks"]
+        (at,) = [index for index, label in marks if label == stop.step]
+        step = client.get("/api/walk/steps", params={**asked, "start": at}).json()["steps"][0]
+        return {name: value for name, value, _ in step["quantities"]}
+
+    assert float(step_of("Why corridors are ambiguous")["off the truth"]) > 1.5
+    assert float(step_of("The truth is among the candidates")["off the truth"]) < 0.1
+    corridor = next(stop for stop in LESSON if "beams" in stop.title).asked
+    result = client.get("/api/walk/stage", params={**corridor, "stage": "result"}).json()
+    asked = {**corridor, "stage": "result", "start": result["count"] - 1}
+    (last,) = client.get("/api/walk/steps", params=asked).json()["steps"]
+    assert float({name: value for name, value, _ in last["quantities"]}["off the truth"]) < 0.2
+    merge = next(stop for stop in LESSON if "tree" in stop.title).asked
+    asked = {**merge, "stage": "comparison", "count": 3}
+    steps = client.get("/api/walk/steps", params=asked).json()["steps"]
+    _, tree, pivot = [float(step["quantities"][-1][1]) for step in steps]
+    assert tree > 2.0 * pivot

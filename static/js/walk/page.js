@@ -18,6 +18,7 @@ async function start() {
   fill(byId("player"), h("p.message", { role: "status" }, "Integrating the scans, and noting every step…"));
   const walk = await get(`/api/walk?${asked()}`);
   choices(walk);
+  lesson().catch(failed);
   text(byId("name"), walk.title);
   document.title = `${walk.title} – segmap`;
   const player = new Player(byId("player"), { ...walk, title: "Stages" }, { load, open, enter: into });
@@ -26,6 +27,20 @@ async function start() {
   await player.go(question.get("stage") || walk.stages[0].id, question.get("step") ?? 0);
   if (question.get("play") !== null) player.play();
   addEventListener("popstate", () => location.reload());
+}
+
+/** Of a stop of the lesson: what it is about, and the way on. */
+async function lesson() {
+  const number = Number(question.get("lesson"));
+  if (!number) return;
+  const { stops } = await get("/api/lesson");
+  const stop = stops[number - 1];
+  if (!stop) return;
+  const way = (to, words) => stops[to - 1] && h("a.button", { href: stops[to - 1].url }, words);
+  const links = h("div.row", {}, way(number - 1, "Stop before"), way(number + 1, "Next stop"));
+  const told = h("div", {}, h("h2", {}, `Lesson, stop ${number} of ${stops.length}: ${stop.title}`), h("p", {}, stop.say));
+  byId("lesson").hidden = false;
+  fill(byId("lesson"), told, links);
 }
 
 /** The part of the address that says what is walked through, with more for one request. */
@@ -68,6 +83,7 @@ function keep(stage, start, count) {
 
 function remember({ stage, step }) {
   const there = new URLSearchParams([...asked(), ["stage", stage], ["step", step]]);
+  if (question.get("lesson")) there.set("lesson", question.get("lesson"));
   history.replaceState(null, "", `?${there}`);
 }
 
