@@ -137,22 +137,23 @@ def place(components: Iterable[Component], scans: Iterable[ScanId] = ()) -> tupl
 def alongside(placed: Sequence[Placed], others: Iterable[Component], *, over: bool) -> tuple[Placed, ...]:
     """Where components of another map of the same scans are drawn.
 
-    Each is laid on the component with which it shares its first scan that both hold, and, unless ``over``, moved to
-    the right of the whole map; those that share none stand in a row beyond.
+    Each is laid on the component with which it shares its first scan that both hold, and, unless ``over``, moved
+    beyond the whole map, along its shorter side; those that share none stand in a row to the right.
     """
-    shown = [one.map.bounds for one in placed if one.map.bounds is not None]
-    width = (max(b[2] for b in shown) - min(b[0] for b in shown) + 2.0 * GAP) if shown else 0.0
-    shift = Pose2.identity() if over else Pose2(width, 0.0, 0.0)
+    left, bottom, right, top = box(*(one.map.coordinates for one in placed)) or (0.0, 0.0, 0.0, 0.0)
+    width, height = right - left + 2.0 * GAP, top - bottom + 2.0 * GAP
+    across = Pose2(0.0, -height, 0.0) if width > height else Pose2(width, 0.0, 0.0)
+    shift = Pose2.identity() if over else across
     found: list[Placed] = []
-    right = (max(b[2] for b in shown) if shown else 0.0) + (0.0 if over else width)
+    right += max(0.0, shift.x)
     for component in others:
         if len(component.scans) < 2:
             continue
         home = next(((p, s) for s in component.scans for p in placed if s in p.component.poses), None)
         if home is None:
-            left, bottom, to, _ = component.map.bounds or (0.0, 0.0, 0.0, 0.0)
-            found.append(Placed(component, Pose2(right - left + GAP, -bottom, 0.0)))
-            right += to - left + GAP
+            x, y, to, _ = component.map.bounds or (0.0, 0.0, 0.0, 0.0)
+            found.append(Placed(component, Pose2(right - x + GAP, shift.y - y, 0.0)))
+            right += to - x + GAP
         else:
             part, scan = home
             found.append(Placed(component, shift @ part.pose(scan) @ component.poses[scan].inverse()))

@@ -103,7 +103,8 @@ def _layer(name: str, visible: bool, content: Content) -> Layer:
 def _subject(content: Content) -> tuple[str, ...]:
     integration = content.pair.integration if content.pair else ""
     if content.stage == "map":
-        return ("map", *(placed.component.name for placed in content.placed[:1]))
+        beside = (content.map.looks.compare, content.map.looks.side) if content.beside else ()
+        return ("map", *(placed.component.name for placed in content.placed[:1]), *beside)
     return (integration, "superimposed" if content.superimposed else "side by side")
 
 

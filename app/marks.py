@@ -32,8 +32,8 @@ class Measurement:
 
     def in_words(self) -> str:
         """For the label in the scene."""
-        told = f"{self.length:.2f} m  (x {self.dx:.2f}, y {self.dy:.2f}, {math.degrees(self.heading):.1f}°)"
-        return told.replace("-", "−")
+        x, y, turn = (round(number, 2) + 0.0 for number in (self.dx, self.dy, math.degrees(self.heading)))
+        return f"{self.length:.2f} m  (x {x:.2f}, y {y:.2f}, {turn:.1f}°)".replace("-", "−")
 
 
 def measurement(places: tuple[tuple[float, float], ...]) -> Measurement | None:
