@@ -183,6 +183,16 @@ ALGORITHMS = {
 """
         ),
     ),
+    "methods": Algorithm(
+        "Merge a sequence of scans: the three methods (Section IV)",
+        _lines(
+            """
+A | sequential: integrate each new scan with the whole map so far; n - 1 integrations
+B | tree: integrate neighbours, then the results with their neighbours, and so on; n (n - 1) / 2 integrations
+C | pivot: integrate neighbours, compose the motions, fuse each scan once; n - 1 integrations
+"""
+        ),
+    ),
     "verified": Algorithm(
         "Verify by lines of sight (beyond the paper)",
         _lines(

@@ -204,8 +204,9 @@ def _comparison(merges: Mapping[str, Merge]) -> Stage:
     doubled = [sum(spurious_length(part.map) for part in made.components) for made in merges.values()]
     chart = {
         "kind": "bars",
-        "title": f"Doubled walls: {', '.join(names)}",
-        "x": " | ".join(names),
+        "title": "Doubled walls by method",
+        "x": "",
+        "names": names,
         "y": "m",
         "values": [round(length, 3) for length in doubled],
         "marked": {str(int(np.argmax(doubled))): "bad"},
@@ -222,14 +223,14 @@ def _comparison(merges: Mapping[str, Merge]) -> Stage:
             " twice in the map (red). Compare it with the other two."
         )
         told = (("calls of INTEGRATE", str(len(made.calls)), ""), ("segments", str(rows), ""))
-        return Step("3", say, tuple(shapes), (*told, metres("doubled walls", length, 2)))
+        return Step("ABC"[k], say, tuple(shapes), (*told, metres("doubled walls", length, 2)))
 
     return Stage(
         id="comparison",
         title="The three methods compared",
         about="The same scans, the same integrations of neighbours: what differs is what is fused with what, and how"
         " often.",
-        algorithm="sequential",
+        algorithm="methods",
         count=len(names),
         step=step,
         marks=tuple(Mark(k, name) for k, name in enumerate(names)),

@@ -26,7 +26,9 @@ function facts(project) {
 export function sampleCard(sample, open) {
   const button = h("button", { type: "button", "aria-label": `Open ${sample.title}` }, "Open");
   button.addEventListener("click", () => opening(button, () => open(sample.name)));
-  const about = [h("h3", {}, sample.title), h("p.description", {}, sample.description), button];
+  const walk = h("a.walk", { href: `/walk?${new URLSearchParams({ sample: sample.name })}` }, "Walk through");
+  const ways = h("div.ways", {}, button, walk);
+  const about = [h("h3", {}, sample.title), h("p.description", {}, sample.description), ways];
   const scans = h("p.muted", {}, count(sample.scans, "scan"));
   return h("li.card", {}, picture(sample.picture, "No picture"), h("div.body", {}, about[0], scans, ...about.slice(1)));
 }

@@ -16,8 +16,10 @@ export function chart(told, at, enter) {
   return element("svg", { class: "chart", role: "img", viewBox: `0 0 ${WIDTH} ${height}` }, ...words);
 }
 
-function bars({ values, marked, x, y, legend = [] }) {
+function bars({ values, marked, x, y, names, legend = [] }) {
   const scale = axes(x, y, [0, values.length], [0, Math.max(...values, 1e-9)]);
+  if (names) scale.parts = scale.parts.filter((part) => !part.matches(".across"));
+  const below = (name, place) => said(name, scale.place(place + 0.5, 0)[0], HEIGHT - EDGE.bottom + 14, "tick middle");
   const parts = values.map((value, number) => {
     const [left, top] = scale.place(number, value);
     const [right, bottom] = scale.place(number + 1, 0);
@@ -25,7 +27,7 @@ function bars({ values, marked, x, y, legend = [] }) {
     return element("rect", { ...size, class: `bar role-${marked[number] ?? "first"}` });
   });
   const notes = legend.map(([role, words], number) => said(words, WIDTH - 14, 34 + 14 * number, `legend role-${role}`));
-  return { parts: [...scale.parts, ...parts, ...notes] };
+  return { parts: [...scale.parts, ...parts, ...notes, ...(names ?? []).map(below)] };
 }
 
 function series({ values, x, y }, at) {
@@ -99,8 +101,8 @@ function axes(x, y, [x1, x2], [y1, y2], logarithmic = false) {
     said(number(y2), left - 5, EDGE.top + 9, "tick end"),
     said(number(y1), left - 5, bottom, "tick end"),
     said(y, left - 5, EDGE.top + h / 2, "tick end"),
-    said(number(real(x1)), left, bottom + 13, "tick"),
-    said(number(real(x2)), left + w, bottom + 13, "tick end"),
+    said(number(real(x1)), left, bottom + 13, "tick across"),
+    said(number(real(x2)), left + w, bottom + 13, "tick end across"),
     said(x, left + w / 2, bottom + 27, "tick middle"),
   ];
   return { place, parts };
