@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
 from app.cli.options import DEFAULT_MODE, Heuristic, Json, Method, Mode, Preset, Setting, method_of, read
@@ -55,9 +56,11 @@ def pairs(
         _draw(failures, ran, method)
     if as_json:
         failed = [_failure(one.name, outcome) for one in ran for outcome in one.failed]
-        print_json({"logs": [asdict(one) for one in scores], "failures": failed})
+        print_json({"logs": [asdict(one) for one in scores], "failures": failed, "cpu_milliseconds": _times(ran)})
     else:
         _print(scores, f"mode {method.mode}, heuristic {method.heuristic}")
+        times = ", ".join(f"{what} {milliseconds:.1f} ms" for what, milliseconds in _times(ran).items())
+        typer.echo(f"processor time a pair, all kinds and logs together: {times}")
         for one in ran:
             for outcome in one.failed:
                 typer.echo(f"failed: {_told(one.name, outcome)}")
@@ -84,6 +87,12 @@ def _run(file: Path, logs: Path, method: Method, repeats: int, brute: int) -> _R
             pair_set, log, method.parameters, method.heuristic, method.mode, repeats=repeats, brute=brute, progress=tell
         )
     return _Ran(pair_set.log, log, outcomes)
+
+
+def _times(ran: Sequence[_Ran]) -> dict[str, float]:
+    """Processor time a pair in milliseconds, of all pairs there are."""
+    spent = np.array([outcome.cpu_milliseconds for one in ran for outcome in one.outcomes])
+    return {"median": float(np.median(spent)), "95 %": float(np.percentile(spent, 95.0))} if len(spent) else {}
 
 
 def _text(file: Path) -> bytes:

@@ -62,6 +62,9 @@ def test_the_documented_keys_and_those_beside_them(run: Run, pairs: Path) -> Non
     (failed,) = told["failures"]
     assert (failed["log"], failed["kind"], failed["i"], failed["j"]) == ("laboratory.log", "consecutive", 8, 9)
     assert failed["among_first_three"] is False
+    kinds = [kind["median_cpu_ms"] for kind in log["kinds"].values()]
+    assert min(kinds) <= told["cpu_milliseconds"]["median"] <= max(kinds)
+    assert told["cpu_milliseconds"]["median"] <= told["cpu_milliseconds"]["95 %"]
 
 
 def test_failures_are_named_and_drawn(run: Run, pairs: Path, tmp_path: Path) -> None:
@@ -71,6 +74,7 @@ def test_failures_are_named_and_drawn(run: Run, pairs: Path, tmp_path: Path) -> 
     assert status == 0
     (line,) = [line for line in out.splitlines() if line.startswith("failed: ")]
     assert "laboratory.log, consecutive, scans 8 and 9: " in line
+    assert "all kinds and logs together: median " in out
     assert "m and" in line
     (picture,) = folder.glob("*.svg")
     assert picture.name == "laboratory-consecutive-8-9.svg"
