@@ -62,8 +62,8 @@ class Pair:
 
     @property
     def rank(self) -> int | None:
-        """Of the candidate shown, 0 for the best."""
-        return None if self.candidate is None else self.ranked.index(self.candidate)
+        """Of the candidate shown, 0 for the best; None where none is, or where the second map is held by hand."""
+        return self.ranked.index(self.candidate) if self.candidate in self.ranked else None
 
     @cached_property
     def by_value(self) -> tuple[int, ...]:
@@ -176,6 +176,10 @@ class Content:
     shown: Mapping[str, bool] = field(default_factory=dict)
     """layers switched on or off by hand, by name; the others are as the stage has them"""
     picked: Pick | None = None
+    held: Pose2 | None = None
+    """where the second map is held by hand, at the moment"""
+    laying: tuple[Pick, ...] = ()
+    """segments clicked to lay the second map by"""
     message: str = ""
     """what to say where there is nothing to see"""
     map: MapContent = field(default_factory=MapContent)
@@ -234,6 +238,8 @@ class Content:
         """Where the second map stands in the frame of the first."""
         if self.pair is None:
             return Pose2.identity()
+        if self.held is not None:
+            return self.held
         if self.superimposed and self.pair.candidate is not None:
             return self.pair.candidate.T_1_2
         return self.pair.beside

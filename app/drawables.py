@@ -23,12 +23,16 @@ DASH = 0.15
 """metres, of a dash and of a gap"""
 
 
+CHAIN = "chain"
+"""the source of a Pick that names a matching chain, by its place in order of value"""
+
+
 @dataclass(frozen=True)
 class Pick:
     """One segment that can be clicked."""
 
     source: str
-    """``first``, ``second``, or the name of a component of the merged map"""
+    """``first``, ``second``, the name of a component of the merged map, or ``CHAIN``"""
     segment: int
 
 

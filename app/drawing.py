@@ -68,7 +68,7 @@ def draw(content: Content) -> Picture:
     """The picture of a content; empty scans, one segment or no candidate give a sensible, smaller one."""
     shown = layers(content)
     drawables = [d for layer in shown if layer.visible for d in _KINDS[layer.name].drawer(content)]
-    drawables += [*marks.picked(content), *marks.measured(content)]
+    drawables += [*marks.picked(content), *marks.laying(content), *marks.measured(content)]
     if content.bounds is None:
         text = content.message or "There is nothing to show yet."
         drawables.append(label("message", "message", text, (0.0, 0.0), content.palette.text))

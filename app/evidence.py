@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+from app.claims import NUDGED
 from app.content import Content, Pair, Tie
 from app.drawing import LAYERS_OF
 from app.looks import Looks
@@ -15,9 +16,10 @@ from app.review import Row
 from app.sights import sights
 from segmap.chains import matching_chains
 from segmap.fusion import fuse
-from segmap.integration import Match, heuristics
+from segmap.integration import Candidate, Match, heuristics
 from segmap.merging import Component, misfit
-from segmap.pose import FloatArray
+from segmap.placing import judged_at
+from segmap.pose import FloatArray, Pose2
 from segmap.project import IntegrationId, ProjectState
 from segmap.scans import ScanId
 
@@ -66,6 +68,8 @@ class Evidence:
 
     def match(self, looks: Looks) -> Match | None:
         """The match of the integration looked at, by the heuristic looked at; None: not computed yet."""
+        if looks.trial is not None:
+            return looks.trial.match
         if looks.integration is None:
             return None
         return self._session.match(looks.integration, self.heuristic(looks))
@@ -73,7 +77,8 @@ class Evidence:
     def unknown(self, looks: Looks) -> bool:
         """Whether there is a match to be computed: none is there, and none has failed."""
         integration, heuristic = looks.integration, self.heuristic(looks)
-        return integration is not None and self._session.outcome(integration, heuristic) is None
+        known = looks.trial is not None or integration is None
+        return not known and self._session.outcome(str(integration), heuristic) is None
 
     def heuristic(self, looks: Looks) -> str:
         """The heuristic looked at, by name; the project's, where its mode does not know the one looked at."""
@@ -93,6 +98,8 @@ class Evidence:
             theme=looks.theme,
             shown=looks.shown,
             picked=looks.picked,
+            held=looks.held,
+            laying=looks.laying,
             message=self._message(looks, pair),
             map=self._map(looks),
             measured=looks.measured,
@@ -115,20 +122,34 @@ class Evidence:
             return None
         session, state, match = self._session, self._session.state, self.match(looks)
         scans = IntegrationId.parse(looks.integration)
-        reach = state.parameters.max_range
+        parameters = looks.trial.parameters if looks.trial else state.parameters
+        maps = (
+            looks.trial.maps if looks.trial else (session.segment_map(scans.first), session.segment_map(scans.second))
+        )
+        reach = parameters.max_range
         pair = Pair(
             integration=looks.integration,
             scans=(scans.first, scans.second),
             names=(scan_name(scans.first, state), scan_name(scans.second, state)),
-            maps=(session.segment_map(scans.first), session.segment_map(scans.second)),
+            maps=maps,
             returns=(session.scan(scans.first).returns(reach)[0], session.scan(scans.second).returns(reach)[0]),
-            parameters=state.parameters,
+            parameters=parameters,
             **({} if match is None else _found(match)),
         )
-        return self._at_candidate(pair, looks) if pair.ranked else pair
+        if looks.held is not None:
+            return self._held(pair, looks.held, looks)
+        if not pair.ranked:
+            return pair
+        return self._at_candidate(pair, pair.ranked[min(looks.rank, len(pair.ranked) - 1)], looks)
 
-    def _at_candidate(self, pair: Pair, looks: Looks) -> Pair:
-        candidate = pair.ranked[min(looks.rank, len(pair.ranked) - 1)]
+    def _held(self, pair: Pair, T_1_2: Pose2, looks: Looks) -> Pair:
+        """While it is dragged: what the place where it is held is worth, now; nothing of it is remembered."""
+        held = judged_at(*pair.maps, T_1_2, pair.parameters, self._session.state.mode, NUDGED)
+        chains = matching_chains(*pair.maps, T_1_2, pair.parameters)
+        seen = sights(*pair.maps, T_1_2, pair.parameters) if "sights" in LAYERS_OF[looks.stage] else None
+        return replace(pair, candidate=held, chains=chains, sights=seen)
+
+    def _at_candidate(self, pair: Pair, candidate: Candidate, looks: Looks) -> Pair:
         chains = self._chains(*pair.maps, candidate.T_1_2, pair.parameters)
         fusion = None
         if looks.stage == "fused":
@@ -164,7 +185,7 @@ class Evidence:
     def _elsewhere(self, pair: Pair) -> str:
         """A word on a decision that was made on another pose than the one shown."""
         decision = self._session.state.decisions.get(pair.integration)
-        if decision is None or decision.T_1_2 is None or pair.candidate is None:
+        if decision is None or decision.T_1_2 is None or pair.candidate is None or pair.rank is None:
             return ""
         distance, turn = decision.T_1_2.distance(pair.candidate.T_1_2)
         if max(distance, turn) < SAME_POSE:

@@ -8,8 +8,25 @@ from types import MappingProxyType
 
 from app.drawables import Pick
 from app.map_looks import MapLooks
+from segmap.matches import Match
+from segmap.parameters import Parameters
+from segmap.pose import Pose2
+from segmap.segments import SegmentMap
 
-__all__ = ["Looks"]
+__all__ = ["Looks", "Trial"]
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What other parameters make of one pair."""
+
+    parameters: Parameters
+    maps: tuple[SegmentMap, SegmentMap]
+    match: Match
+    milliseconds: float
+    """for segments and match"""
+    number: int
+    """a later trial has a larger one"""
 
 
 @dataclass(frozen=True)
@@ -37,6 +54,16 @@ class Looks:
     """whether clicks measure"""
     measured: tuple[tuple[float, float], ...] = ()
     """metres; the places that were clicked to measure, two at most"""
+    nudging: bool = False
+    """whether the second map is to be laid by hand"""
+    held: Pose2 | None = None
+    """where the second map is held, while it is dragged"""
+    laying: tuple[Pick, ...] = ()
+    """the segments clicked so far, to lay the second map by them: each with its partner after it"""
+    reason: str = ""
+    """of the next decision"""
+    trial: Trial | None = None
+    """parameters that are tried on this pair"""
 
     @property
     def shown(self) -> dict[str, bool]:
@@ -45,9 +72,10 @@ class Looks:
 
     def at(self, integration: str | None, heuristic: str | None = None, rank: int = 0) -> Looks:
         """The same view of another integration, or of another candidate of it."""
-        return replace(
-            self, integration=integration, heuristic=heuristic, rank=rank, picked=None, notice="", measured=()
-        )
+        blank = {"picked": None, "notice": "", "held": None, "laying": (), "trial": None, "measured": ()}
+        if integration != self.integration:
+            blank |= {"nudging": False, "reason": ""}
+        return replace(self, integration=integration, heuristic=heuristic, rank=rank, **blank)
 
     def switch(self, layer: str, on: bool) -> Looks:
         """With a layer of this stage drawn or not."""

@@ -8,15 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.content import Content, Placed
-from app.drawables import Drawable, Frame, Pick, label, lines, points
+from app.content import Content, Placed, merit
+from app.drawables import CHAIN, Drawable, Frame, Pick, label, lines, points
 from app.grid import spacing
 from segmap.pose import FloatArray
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 
-__all__ = ["Measurement", "measured", "measurement", "picked", "seen_by"]
+__all__ = ["Measurement", "laying", "measured", "measurement", "picked", "seen_by"]
 
+FRAME_OF: dict[str, Frame] = {"first": "first", "second": "second"}
+"""of the maps of a pair, by the source of a Pick"""
 MOST = 12
 """scans whose lines of sight to a clicked wall are drawn"""
 
@@ -60,16 +62,46 @@ def measured(content: Content) -> Iterator[Drawable]:
 
 
 def picked(content: Content) -> Iterator[Drawable]:
-    """The segment that was clicked, marked; of a merged wall, also who saw it from where."""
+    """The segment that was clicked, or the chain, marked; of a merged wall, also who saw it from where."""
     pick = content.picked
+    if pick is not None and pick.source == CHAIN:
+        yield from _chain(content, pick.segment)
+        return
     segment_map = None if pick is None else content.map_of(pick.source)
     if pick is None or segment_map is None or not 0 <= pick.segment < len(segment_map):
         return
-    frame: Frame = "first" if pick.source == "first" else "second" if pick.source == "second" else "map"
+    frame = FRAME_OF.get(pick.source, "map")
     marked = lines(segment_map.coordinates[[pick.segment]])
     yield Drawable("picked", "picked", "lines", marked, content.palette.accent, frame, depth=15, thickness=8.0)
     if frame == "map":
         yield from _sights(content, pick, segment_map)
+
+
+def _chain(content: Content, place: int) -> Iterator[Drawable]:
+    """The segments of a matching chain, in both maps."""
+    pair = content.pair
+    if pair is None or not 0 <= place < len(pair.chains):
+        return
+    chain, colour = pair.chains[pair.by_value[place]], content.palette.accent
+    for frame, segment_map, rows in zip(FRAME_OF.values(), pair.maps, (chain.first, chain.second), strict=True):
+        marked = lines(segment_map.coordinates[list(rows)])
+        yield Drawable("picked", "picked", "lines", marked, colour, frame, depth=15, thickness=8.0)
+
+
+def laying(content: Content) -> Iterator[Drawable]:
+    """The segments clicked to lay the second map by, numbered by pair; and what the place it is held at is worth."""
+    for place, pick in enumerate(content.laying):
+        segment_map, frame = content.map_of(pick.source), FRAME_OF[pick.source]
+        if segment_map is not None and 0 <= pick.segment < len(segment_map):
+            name, one = f"laying/{place}", segment_map.coordinates[pick.segment]
+            yield Drawable(name, "laying", "lines", lines(one[None]), content.palette.accent, frame, 15, 7.0)
+            at = (one[:2] + one[2:]) / 2.0
+            yield label(f"{name}/label", "laying", str(place // 2 + 1), at, content.palette.accent, frame, 16)
+    pair = content.pair
+    if content.held is not None and pair is not None and pair.candidate is not None:
+        text = "value" if pair.candidate.score is None else "score"
+        worth = f"{text} {merit(pair.candidate):.2f} m".replace("-", "−")
+        yield label("held", "laying", worth, (0.6, 0.0), content.palette.text, "second", 16)
 
 
 def _sights(content: Content, pick: Pick, segment_map: SegmentMap) -> Iterator[Drawable]:

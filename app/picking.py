@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 import shapely
 
-from app.content import Content, Tie
-from app.drawables import Pick
+from app.content import Content, Pair, Tie
+from app.drawables import CHAIN, Pick
 from app.drawing import Picture
 from app.graph_layers import TIES
 from app.marks import seen_by
@@ -22,11 +22,14 @@ TOLD = 12
 """integrations that are told of a merged wall"""
 
 
-def nearest(picture: Picture, x: float, y: float, reach: float) -> Pick | None:
-    """The segment drawn nearest to a place, at most ``reach`` away, metres; of equally near ones the one on top."""
+def nearest(picture: Picture, x: float, y: float, reach: float, sources: Collection[str] | None = None) -> Pick | None:
+    """The segment drawn nearest to a place, at most ``reach`` away, metres; of equally near ones the one on top.
+
+    ``sources``: only segments of these.
+    """
     lines, picks, depths = [], [], []
     for drawable in picture.drawables:
-        if drawable.source:
+        if drawable.source and (sources is None or drawable.source in sources):
             flat = drawable.points[:, :, :2].astype(np.float64)
             lines.append(picture.T_1_2 @ flat if drawable.frame == "second" else flat)
             picks += [Pick(drawable.source, int(segment)) for segment in drawable.segments]
@@ -41,6 +44,8 @@ def nearest(picture: Picture, x: float, y: float, reach: float) -> Pick | None:
 def explain(content: Content) -> dict[str, Any] | None:
     """What the clicked segment is and does, for the panel and the page; None where nothing is clicked."""
     pick = content.picked
+    if pick is not None and pick.source == CHAIN:
+        return _chain(content, pick.segment)
     segment_map = None if pick is None else content.map_of(pick.source)
     if pick is None or segment_map is None or not 0 <= pick.segment < len(segment_map):
         return None
@@ -100,6 +105,24 @@ def corner(picture: Picture, x: float, y: float, reach: float) -> tuple[float, f
     return (float(together[at, 0]), float(together[at, 1])) if away[at] <= reach else None
 
 
+def _chain(content: Content, place: int) -> dict[str, Any] | None:
+    """A matching chain that was chosen from a list."""
+    pair = content.pair
+    if pair is None or not 0 <= place < len(pair.chains):
+        return None
+    return {"source": CHAIN, "segment": place, "chain": _summary(content, pair, place)}
+
+
+def _summary(content: Content, pair: Pair, place: int) -> dict[str, Any]:
+    chain = pair.chains[pair.by_value[place]]
+    return {
+        "number": place + 1,
+        "value": chain.value,
+        "segments": len(chain.first) + len(chain.second),
+        "colour": hexadecimal(content.palette.chain(place)),
+    }
+
+
 def _in_chain(content: Content, pick: Pick) -> dict[str, Any]:
     """The segment's share in the value: the sum of its matching values, and its chain."""
     pair = content.pair
@@ -111,10 +134,5 @@ def _in_chain(content: Content, pick: Pick) -> dict[str, Any]:
         if mine:
             told["adds"] = sum(value for _, _, value in mine)
             told["matches"] = [{"segment": pairing[1 - side], "value": pairing[2]} for pairing in mine]
-            told["chain"] = {
-                "number": place + 1,
-                "value": pair.chains[k].value,
-                "segments": len(pair.chains[k].first) + len(pair.chains[k].second),
-                "colour": hexadecimal(content.palette.chain(place)),
-            }
+            told["chain"] = _summary(content, pair, place)
     return told

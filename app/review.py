@@ -26,6 +26,9 @@ THRESHOLDS = ("value_threshold", "confidence_accept", "confidence_review")
 """the parameters a verdict depends on"""
 
 
+EVIDENCE = ("score", "supported", "contradicted")
+
+
 @dataclass(frozen=True)
 class Outcome:
     """A match in short: enough for the queue, for decisions on the best candidate, and to compare heuristics."""
@@ -96,6 +99,10 @@ class Row:
     """verified mode: probability, in 0..1, that the pose is right"""
     score: float | None = None
     """verified mode: support less conflict, metres"""
+    supported: float | None = None
+    """verified mode: metres that both scans see"""
+    contradicted: float | None = None
+    """verified mode: metres that one scan sees and the other's lines of sight deny"""
     heuristic: str = ""
     candidates: int | None = None
     milliseconds: float | None = None
@@ -111,6 +118,10 @@ class Row:
     """standard deviations; the same, of what is accepted"""
     silenced: bool = False
     """accepted, and the optimiser does not believe it"""
+    origin: str = "found"
+    """of the pose decided on: found, claimed or nudged"""
+    later: bool = False
+    """undecided, and somebody skipped it"""
 
     def to_json(self) -> dict[str, Any]:
         """The row as the pages get it."""
@@ -150,13 +161,21 @@ class Rows:
     def __contains__(self, integration: str) -> bool:
         return integration in self._blank
 
-    def row(self, integration: str, state: ProjectState, outcome: Outcome | None, fate: Fate | None = None) -> Row:
+    def row(
+        self,
+        integration: str,
+        state: ProjectState,
+        outcome: Outcome | None,
+        fate: Fate | None = None,
+        later: bool = False,
+    ) -> Row:
         """The row of an integration in a state of the project."""
-        decision, settings = state.decisions.get(integration), (*_settings(state, integration), fate)
+        decision, settings = state.decisions.get(integration), (*_settings(state, integration), fate, later)
         held = self._made.get(integration)
         if held and held[0] is outcome and held[1] is decision and held[2] == settings:
             return held[3]
         made = _fated(self.tried(integration, state, outcome, state.parameters), fate)
+        made = replace(made, later=later and decision is None)
         self._made[integration] = outcome, decision, settings, made
         return made
 
@@ -197,7 +216,7 @@ def _undecided(blank: Row, outcome: Outcome | None, parameters: Parameters) -> R
         return blank
     if outcome.failure:
         return replace(blank, state="failed", reason=outcome.failure)
-    verdict = outcome.verdict(parameters)
+    verdict, found = outcome.verdict(parameters), outcome.findings
     return replace(
         blank,
         state="none" if outcome.pose is None else "pending",
@@ -205,7 +224,9 @@ def _undecided(blank: Row, outcome: Outcome | None, parameters: Parameters) -> R
         verdict=str(verdict),
         above=verdict is Verdict.ACCEPTED,
         confidence=outcome.confidence,
-        score=outcome.findings.score if outcome.findings else None,
+        score=found.score if found else None,
+        supported=found.evidence.supported if found else None,
+        contradicted=found.evidence.contradicted if found else None,
         candidates=outcome.candidates,
         milliseconds=outcome.milliseconds,
     )
@@ -213,7 +234,11 @@ def _undecided(blank: Row, outcome: Outcome | None, parameters: Parameters) -> R
 
 def _decided(found: Row, decision: Decision, judged: bool) -> Row:
     """A decided row; what the program says is only shown where it is ``judged``: said of the pose decided on."""
-    silent: dict[str, Any] = {} if judged else dict.fromkeys(("verdict", "above", "confidence", "score"))
+    known = (
+        {} if decision.grounds is None else decision.grounds.model_dump(include={"supported", "contradicted", "score"})
+    )
+    unsaid: dict[str, Any] = {**dict.fromkeys(("verdict", "above", "confidence", *EVIDENCE)), **known}
+    silent = {} if judged else unsaid
     return replace(
         found,
         state=decision.verdict,
@@ -221,6 +246,7 @@ def _decided(found: Row, decision: Decision, judged: bool) -> Row:
         heuristic=decision.heuristic or found.heuristic,
         who=decision.who,
         reason=decision.reason,
+        origin=decision.origin,
         **silent,
     )
 
@@ -236,8 +262,8 @@ def queue(rows: Iterable[Row], mode: str, parameters: Parameters) -> list[Row]:
     return sorted(rows, key=lambda r: (*_need(r), _clarity(r, criterion, threshold), r.first, r.second))
 
 
-def _need(r: Row) -> tuple[int, bool]:
-    return STATES.index(r.state), r.verdict != Verdict.REVIEW
+def _need(r: Row) -> tuple[int, bool, bool]:
+    return STATES.index(r.state), r.later, r.verdict != Verdict.REVIEW
 
 
 def _clarity(r: Row, criterion: Criterion, threshold: float) -> float:

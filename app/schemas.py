@@ -24,6 +24,7 @@ __all__ = [
     "Integration",
     "LogFacts",
     "MatchingAction",
+    "NudgeAt",
     "ParameterList",
     "ParametersChange",
     "ProgressBody",
@@ -62,6 +63,18 @@ class Decisions(Body):
     who: Name = ""
     expected_revision: Revision | None = None
     """the revision the page shows: refused with 409 where somebody decided the same since"""
+
+
+class NudgeAt(Body):
+    """Lay the second scan of a pair by hand."""
+
+    integration: IntegrationId
+    pose: tuple[float, float, float] | None = None
+    """where it is let go: x, y in metres, theta in radians, in the frame of the first scan"""
+    ties: tuple[tuple[Rank, Rank], ...] = Field(default=(), max_length=100)
+    """or: segments of the first and of the second scan that are the same wall"""
+    reason: Text = ""
+    who: Name = ""
 
 
 class Turn(Body):
@@ -273,6 +286,9 @@ class Integration(BaseModel):
     above: bool | None
     confidence: float | None
     score: float | None
+    supported: float | None
+    """metres; the same"""
+    contradicted: float | None
     heuristic: str
     candidates: int | None
     milliseconds: float | None
@@ -288,6 +304,10 @@ class Integration(BaseModel):
     """standard deviations, of what is accepted"""
     silenced: bool
     """accepted, and the optimiser does not believe it"""
+    origin: Literal["found", "claimed", "nudged"]
+    """of the pose decided on"""
+    later: bool
+    """undecided, and somebody skipped it"""
 
     @classmethod
     def of(cls, row: Row) -> Integration:

@@ -11,19 +11,20 @@ from app.changes import Change, changed, events_of, is_accepted, settings_of
 from app.claims import suggested_rank, with_claim
 from app.comparing import Others
 from app.creation import Filled, Source, put_in, read_sources
-from app.criterion import CRITERIA, Criterion
 from app.deciding import choose
 from app.errors import UnknownError
 from app.inputs import Facts, Inputs
 from app.jobs import Check, WarmUp
+from app.later import Later
 from app.listeners import Listener, Listeners
 from app.loops import Loops
 from app.matching import Matching, Progress, Settings
 from app.merged import Extractor, Merged, MergedMap, map_parameters
 from app.pairs import integrations_of
 from app.posegraph import Solver, graph_of
+from app.queueing import Queueing
 from app.reporting import Reporter
-from app.review import Flips, Outcome, Row, Rows, counts, flips, queue
+from app.review import Outcome, Rows
 from app.searching import SEARCH, WORKERS, Found, new_proposals
 from app.steps import Steps
 from segmap.errors import SegmapError
@@ -43,7 +44,7 @@ PICTURE = "picture"
 """key of the merged map's picture among the results in the project file; empty: there is no map"""
 
 
-class Session(Steps):
+class Session(Steps, Queueing):
     """An open project. Listeners hear of everything that happens in it, from whichever thread it happened in."""
 
     def __init__(
@@ -68,7 +69,7 @@ class Session(Steps):
         """the segments of a scan under any parameters"""
         self._integrations = tuple[str, ...]()
         self._rows = Rows(())
-        self._version, self._queue = 0, (-1, tuple[Row, ...]())
+        self._later = Later(store)
         self._matching = Matching(
             store,
             self._match,
@@ -196,44 +197,6 @@ class Session(Steps):
         """The rank of the candidate to begin with: where our own search says that the scans lie, else the best."""
         return suggested_rank(self._state.proposals.get(integration), lambda: self.match(integration, heuristic))
 
-    # --- the review queue -------------------------------------------------------------------------
-
-    def row(self, integration: str) -> Row:
-        """An integration as the queue shows it."""
-        state = self._state
-        outcome = self._matching.outcome(self._checked(integration), state.heuristic)
-        return self._rows.row(integration, state, outcome, self.loops.fate(integration, state, outcome))
-
-    def rows(self) -> list[Row]:
-        """The review queue, the integration that most needs a person first."""
-        with self._lock:
-            version, held = self._queue
-            if version != self._version:
-                state, version = self._state, self._version
-                held = tuple(queue((self.row(name) for name in self._integrations), state.mode, state.parameters))
-                self._queue = (version, held)
-            return list(held)
-
-    def counts(self) -> Mapping[str, int]:
-        """How many integrations there are, in all and in each state."""
-        return counts(self.rows())
-
-    @property
-    def criterion(self) -> Criterion:
-        """What the threshold is about in the project's mode."""
-        return CRITERIA[self._state.mode]
-
-    def preview_threshold(self, value: float) -> Flips:
-        """The undecided integrations that another threshold of the criterion would flip.
-
-        Raises:
-            ParameterError: it is out of bounds.
-        """
-        state, rows = self._state, self.rows()
-        parameters = self.criterion.moved(state.parameters, value)
-        found = {r.id: self._matching.outcome(r.id, state.heuristic) for r in rows}
-        return flips(rows, [self._rows.tried(id, state, outcome, parameters) for id, outcome in found.items()])
-
     # --- the merged map ---------------------------------------------------------------------------
 
     def components(self) -> tuple[Component, ...]:
@@ -341,6 +304,7 @@ class Session(Steps):
             self._inputs.add(self._state.logs, {})
         change = Change(self._state, changed(before, self._state))
         self._version += 1
+        self._later.discard(name for name in change.integrations if name in self._state.decisions)
         self._follow(change, before)
         return change
 
@@ -371,13 +335,15 @@ class Session(Steps):
         check()
         return self._find(*maps, settings.searched, heuristic, settings.mode, check=check)
 
+    def _tell_all(self, event: Mapping[str, Any]) -> None:
+        self._tell(event)
+
     def _prepare(self, check: Check) -> None:
         if self._warm_up is not None:
             self._warm_up.wait(check)
 
     def _matched(self, integration: str, heuristic: str) -> None:
-        with self._lock:
-            self._version += 1
+        self._resort()
         row = self.row(integration).to_json()
         self._tell({"type": "match", "integration": integration, "heuristic": heuristic, "row": row})
 
@@ -388,8 +354,7 @@ class Session(Steps):
         self._tell({"type": "map", "revision": merged.revision, "hash": merged.hash})
 
     def _optimised(self) -> None:
-        with self._lock:
-            self._version += 1
+        self._resort()
         self._tell({"type": "graph", "revision": self.loops.graph.revision})
 
     def _take_closures(self, found: Found) -> str:

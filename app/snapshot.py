@@ -9,7 +9,7 @@ from app.claims import origin
 from app.content import Content, Pair
 from app.drawing import STAGES, Layer, layers
 from app.evidence import Evidence
-from app.looks import Looks
+from app.looks import Looks, Trial
 from app.map_layers import component_colour
 from app.map_looks import COLOURINGS
 from app.marks import measurement
@@ -36,6 +36,11 @@ def snapshot(session: Session, evidence: Evidence, looks: Looks, content: Conten
     return {
         "integration": looks.integration,
         "heuristic": evidence.heuristic(looks),
+        "nudging": looks.nudging,
+        "held": looks.held is not None,
+        "laying": [asdict(pick) for pick in looks.laying],
+        "reason": looks.reason,
+        "trial": None if looks.trial is None else _trial(looks.trial),
         "stage": looks.stage,
         "stages": list(STAGES),
         "dimension": looks.dimension,
@@ -57,7 +62,7 @@ def snapshot(session: Session, evidence: Evidence, looks: Looks, content: Conten
         "undo": state.can_undo,
         "redo": state.can_redo,
         "revision": state.revision,
-        "messages": [text for text in (looks.notice, content.message) if text],
+        "messages": [text for text in (looks.notice, _to_lay(looks), _on_trial(looks), content.message) if text],
     }
 
 
@@ -83,6 +88,32 @@ def _measured(content: Content) -> dict[str, Any] | None:
     return None if found is None else asdict(found)
 
 
+def _trial(trial: Trial) -> dict[str, Any]:
+    return {"number": trial.number, "milliseconds": trial.milliseconds, "segments": list(trial.match.segments)}
+
+
+def _to_lay(looks: Looks) -> str:
+    """What to do next, where the second map is being laid by hand."""
+    if not looks.nudging or looks.held is not None:
+        return ""
+    if not looks.laying:
+        return (
+            "Drag the handle on the second scan, or lay it by its walls: click a segment of one scan, then the segment"
+            " of the other that is the same wall, and two more."
+        )
+    if len(looks.laying) == PAIR:
+        return "Now another wall, best one that is not parallel: click it in one scan, then in the other."
+    partner = "second" if looks.laying[-1].source == "first" else "first"
+    return f"Click the same wall in the {partner} scan."
+
+
+def _on_trial(looks: Looks) -> str:
+    return "These parameters are on trial: apply them, or put them back, to decide." if looks.trial else ""
+
+
+PAIR = 2
+
+
 def _layer(layer: Layer) -> dict[str, Any]:
     return {
         "name": layer.name,
@@ -106,11 +137,7 @@ def _candidate(content: Content) -> dict[str, Any]:
     pair = content.pair
     candidate = None if pair is None else pair.candidate
     if pair is None or candidate is None:
-        nothing = ("candidate", "value", "pose", "angles", "origin", "above", "score", "behind")
-        return {
-            **dict.fromkeys((*nothing, "evidence", "uncertainty")),
-            "candidates": 0 if pair is None else len(pair.ranked),
-        }
+        return {**dict.fromkeys(NOTHING), "candidates": 0 if pair is None else len(pair.ranked)}
     return {
         "candidate": pair.rank,
         "candidates": len(pair.ranked),
@@ -136,8 +163,8 @@ def _above(pair: Pair, candidate: Candidate) -> bool | None:
 
 
 def _behind(pair: Pair, candidate: Candidate) -> float | None:
-    """How much less than the best a rival scores, metres."""
-    best = pair.ranked[0].score
+    """How much less than the best a rival scores, metres; negative where one held by hand scores more."""
+    best = pair.ranked[0].score if pair.ranked else None
     return None if best is None or candidate.score is None else best - candidate.score
 
 

@@ -20,17 +20,19 @@ from app.drawables import Pick
 from app.drawing import LAYERS, STAGES, Picture, draw, layers
 from app.errors import UnknownError
 from app.evidence import Evidence
+from app.explaining import explained
 from app.graph_layers import TIES
+from app.judging import Judging
 from app.listeners import Listeners
 from app.looks import Looks
 from app.map_view import MapActions, known
+from app.nudging import Nudging
 from app.palette import THEMES
 from app.picking import nearest
-from app.review import Row
 from app.snapshot import snapshot
-from segmap.errors import ProjectError
+from app.trying import Trying
 from segmap.events import Decision
-from segmap.integration import heuristics
+from segmap.integration import Match, heuristics
 from segmap.pose import FloatArray
 from segmap.scans import ScanId
 
@@ -45,19 +47,20 @@ RELEVANT = ("decision", "map", "graph", "parameters", "log", "other")
 """session events after which a view may look different"""
 
 
-class View(MapActions):
+class View(MapActions, Judging, Nudging, Trying):
     """What one page shows of a session. Thread-safe; actions raise SegmapError with a sentence for people."""
 
     def __init__(self, session: Session, *, who: str = "", clock: Callable[[], float] = time.monotonic) -> None:
         self.session = session
         self.who = who
-        self._clock, self._decided_at = clock, -DOUBLE_CLICK_SECONDS
+        self._clock = clock
+        self._listed: tuple[str, ...] | None = None
         self._evidence = Evidence(session)
         self._acting = threading.RLock()
         self._looks = Looks()
         self._listeners = Listeners()
         self.subscribe = self._listeners.add
-        self._serials = itertools.count(1)
+        self._serials, self._trials = itertools.count(1), itertools.count(1)
         self._seen = session.state.revision
         self._unsubscribe = session.subscribe(self._hear)
         rows = session.rows()
@@ -89,8 +92,17 @@ class View(MapActions):
         Snapshots are made in several threads and may arrive in another order. The serial is taken before
         anything is looked at, so the one with the greatest serial is the newest.
         """
-        serial, looks = next(self._serials), self._looks
-        return {"serial": serial, **snapshot(self.session, self._evidence, looks, self._evidence.content(looks))}
+        serial, looks = next(self._serials), self._said(self._looks)
+        shown = snapshot(self.session, self._evidence, looks, self._evidence.content(looks))
+        return {"serial": serial, "who": self.who, **shown}
+
+    def match(self) -> Match | None:
+        """The match that is looked at: of the project, or of parameters on trial; None: not computed yet."""
+        return self._evidence.match(self._looks)
+
+    def explanation(self) -> dict[str, Any] | None:
+        """Why the candidate shown has its value and its score; None where none is shown."""
+        return explained(self.content())
 
     def close(self) -> None:
         """Stop listening to the session."""
@@ -122,6 +134,21 @@ class View(MapActions):
         found = enumerate(match.ranked if match else ())
         return next((rank for rank, one in found if one.T_1_2 == decision.T_1_2), decision.candidate or 0)
 
+    def set_order(self, integrations: Sequence[str] | None) -> None:
+        """Step and go on through these integrations only, in this order; None: through the whole queue, in its own.
+
+        It is what the page lists, filtered, searched and sorted.
+        """
+        with self._acting:
+            self._listed = None if integrations is None else tuple(integrations)
+
+    def _order(self) -> tuple[str, ...]:
+        """What the person steps through."""
+        if self._listed is None:
+            return tuple(row.id for row in self.session.rows())
+        known = set(self.session.integrations)
+        return tuple(id for id in self._listed if id in known)
+
     def next(self) -> None:
         """The next integration of the queue; after the last comes the first."""
         self._step(1)
@@ -132,7 +159,7 @@ class View(MapActions):
 
     def _step(self, step: int) -> None:
         with self._acting:
-            ids = [row.id for row in self.session.rows()]
+            ids = self._order()
             if ids:
                 place = ids.index(self._looks.integration) if self._looks.integration in ids else -step
                 self.select(ids[(place + step) % len(ids)])
@@ -244,6 +271,9 @@ class View(MapActions):
         if self._looks.measuring:
             self._measure(draw(content), float(x), float(y), float(reach))
             return
+        if self._looks.nudging:
+            self.lay(nearest(draw(content), float(x), float(y), float(reach), self.partners))
+            return
         picked = nearest(draw(content), float(x), float(y), float(reach))
         if picked is not None and picked.source == TIES:
             self.select(content.ties[picked.segment].integration)
@@ -267,88 +297,11 @@ class View(MapActions):
         perform(self, action, value)
         return self.snapshot()
 
-    # --- deciding ---------------------------------------------------------------------------------
-
-    def accept(self, integration: str | None = None) -> None:
-        """Accept the candidate shown and go on to the next pending integration.
-
-        With ``integration``, only if that is the one looked at: so that a late click decides nothing else.
-        """
-        self._decide("accepted", integration)
-
-    def reject(self, integration: str | None = None) -> None:
-        """Reject the integration and go on to the next pending one; ``integration`` as for :meth:`accept`."""
-        self._decide("rejected", integration)
-
-    def skip(self) -> None:
-        """Leave the integration undecided and go on to the next pending one."""
-        with self._acting:
-            self._go_on(self.session.rows(), "")
-
-    def undo(self) -> None:
-        """Take the last step back, and look at what it was about."""
-        self._turn_back(self.session.undo, self.session.state.can_undo, "Undone")
-
-    def redo(self) -> None:
-        """Do again what was undone, and look at what it is about."""
-        self._turn_back(self.session.redo, self.session.state.can_redo, "Redone")
-
-    def _decide(self, verdict: str, integration: str | None) -> None:
-        with self._acting:
-            if self._late(integration):
-                return
-            looks, rows = self._looks, self.session.rows()
-            if looks.integration is None:
-                raise ProjectError("There is no pair to decide on.")
-            if verdict == "accepted" and not self._count():
-                raise ProjectError(
-                    "There is no transformation to accept: reject the pair, skip it, or try another heuristic."
-                )
-            self.session.decide(
-                [looks.integration],
-                verdict,
-                candidate=self._rank() if self._count() else None,
-                heuristic=self._evidence.heuristic(looks),
-                who=self.who,
-                expected_revision=self._seen,
-            )
-            self._decided_at = self._clock()
-            self._go_on(rows, f"{verdict.capitalize()}: {looks.integration}.")
-
-    def _late(self, integration: str | None) -> bool:
-        """Whether a click came for a pair that has gone already."""
-        if integration is not None:
-            return integration != self._looks.integration
-        return self._clock() - self._decided_at < DOUBLE_CLICK_SECONDS
-
-    def _go_on(self, before: Sequence[Row], notice: str) -> None:
-        following = self._following(before)
-        if following is None:
-            self.say(f"{notice} No other pair waits for a decision.".strip())
-        else:
-            self._look(self._at(following, notice))
-
-    def _following(self, order: Sequence[Row]) -> str | None:
-        """The next integration that waits for a decision, in the order the person saw."""
-        waiting = {row.id for row in self.session.rows() if row.state == "pending"}
-        ids = [row.id for row in order]
-        place = ids.index(self._looks.integration) + 1 if self._looks.integration in ids else 0
-        return next((id for id in ids[place:] + ids[:place] if id in waiting and id != self._looks.integration), None)
-
-    def _turn_back(self, turn: Callable[..., Any], what: str | None, done: str) -> None:
-        with self._acting:
-            change = turn(self.who)
-            listed = set(self.session.integrations)
-            changed = [id for id in change.integrations if id in listed]
-            here = self._present(self._looks).integration
-            target = here if here in changed or not changed else changed[0]
-            looks = self._looks if target is None else self._at(target)
-            self._look(replace(looks, notice=f"{done}: {what}."))
-
     # --- keeping in step --------------------------------------------------------------------------
 
     def _change(self, **changes: Any) -> None:
         with self._acting:
+            self._news = None
             self._look(replace(self._looks, **{"notice": "", **changes}))
 
     def _present(self, looks: Looks) -> Looks:
@@ -360,12 +313,16 @@ class View(MapActions):
 
     def _look(self, looks: Looks) -> None:
         """Look at something else, and tell everybody."""
+        if looks.integration != self._looks.integration:
+            self._news = None
         self._looks = self._present(looks)
         self._tell()
 
     def _hear(self, event: Mapping[str, Any]) -> None:
         """A session event: a match for what is looked at, or a change of what is decided."""
         kind = event.get("type")
+        if kind == "decision":
+            self._heard(event)
         if kind in RELEVANT or (kind == "match" and event.get("integration") == self._looks.integration):
             self._tell()
 

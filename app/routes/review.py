@@ -8,6 +8,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query
 
 from app.claims import CLAIMED, NUDGED, described
+from app.errors import RequestError
+from app.nudging import nudged
 from app.routes.common import Opened
 from app.schemas import (
     DecisionMade,
@@ -16,6 +18,7 @@ from app.schemas import (
     HeuristicResult,
     Integration,
     MatchingAction,
+    NudgeAt,
     ParametersChange,
     ProgressBody,
     Queue,
@@ -25,8 +28,9 @@ from app.schemas import (
 )
 from app.session import Change, Session
 from segmap.integration import Match, heuristics
+from segmap.pose import Pose2
 
-__all__ = ["made", "router"]
+__all__ = ["detail", "made", "router"]
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["review"])
 
@@ -42,12 +46,17 @@ def integration(
     session: Opened, integration: str, heuristic: Annotated[str | None, Query(max_length=255)] = None
 ) -> Detail:
     """One integration in full; a match that is not known yet is looked for next."""
-    row = session.row(integration)
+    session.row(integration)
     match = session.match(integration, heuristic)
     if match is None:
         session.request(integration, heuristic)
+    return detail(session, integration, match)
+
+
+def detail(session: Session, integration: str, match: Match | None) -> Detail:
+    """An integration with a match of it."""
     return Detail(
-        row=Integration.of(row),
+        row=Integration.of(session.row(integration)),
         match=None if match is None else json.loads(match.to_json()),
         claimed=_rank_of(match, CLAIMED),
         nudged=_rank_of(match, NUDGED),
@@ -95,6 +104,17 @@ def decide(session: Opened, body: Decisions) -> DecisionMade:
             expected_revision=body.expected_revision,
         )
     return DecisionMade(**made(session, change))
+
+
+@router.post("/nudges")
+def nudge(session: Opened, body: NudgeAt) -> DecisionMade:
+    """Lay the second scan of a pair by hand; where it settles it is a candidate, to be accepted or undone."""
+    session.row(body.integration)
+    start = None if body.pose is None else Pose2(*body.pose)
+    if (start is None) == (not body.ties):
+        raise RequestError("Say where the second scan is laid: either a pose, or pairs of segments.")
+    laid = nudged(session, body.integration, start, body.ties)
+    return DecisionMade(**made(session, session.nudge(body.integration, laid, who=body.who, reason=body.reason)))
 
 
 @router.post("/undo")

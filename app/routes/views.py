@@ -7,9 +7,11 @@ from typing import Any
 from fastapi import APIRouter
 
 from app.actions import perform
+from app.errors import UnknownError
 from app.project_schemas import OtherMap, OtherMaps
 from app.routes.common import Opened, Site
-from app.schemas import Action, ViewOpened
+from app.routes.review import detail
+from app.schemas import Action, Detail, ViewOpened
 
 __all__ = ["router"]
 
@@ -33,6 +35,22 @@ def others(session: Opened) -> OtherMaps:
 def snapshot(site: Site, view: str) -> dict[str, Any]:
     """What a view shows."""
     return site.views.get(view).view.snapshot()
+
+
+@router.get("/views/{view}/explanation")
+def explanation(site: Site, view: str) -> dict[str, Any] | None:
+    """Why the candidate shown has its value and its score, term by term; null where none is shown."""
+    return site.views.get(view).view.explanation()
+
+
+@router.get("/views/{view}/detail")
+def view_detail(site: Site, view: str) -> Detail:
+    """The integration looked at, in full: as the project has it, or as parameters on trial would."""
+    found = site.views.get(view)
+    integration, match = found.view.looks.integration, found.view.match()
+    if integration is None:
+        raise UnknownError("There is no pair to look at.")
+    return detail(found.session, integration, match)
 
 
 @router.post("/views/{view}")

@@ -18,6 +18,7 @@ from app.drawing import draw
 from app.motion import FRAME_SECONDS, on_the_way
 from app.palette import PALETTES
 from app.scene.camera import Cameras, reach
+from app.scene.gizmo import Gizmo
 from app.scene.nodes import Nodes
 from app.scene.panel import Panel
 from app.scene.server import PASS_HEADER, QuietServer
@@ -43,6 +44,7 @@ class Scene:
         self._nodes = Nodes(self._server.scene)
         self._cameras = Cameras(self._server)
         self._panel = Panel(self._server.gui, view, self._do)
+        self._gizmo = Gizmo(self._server.scene, view, self._do)
         self._draw()
         self._server.scene.on_click()(self._clicked)
         self._server.on_client_connect(self._cameras.welcome)
@@ -68,6 +70,7 @@ class Scene:
             self._unsubscribe()
             self._stale.set()
             self._thread.join(CLOSE_SECONDS)
+            self._gizmo.close(CLOSE_SECONDS)
             self._server.stop()
 
     # --- drawing ----------------------------------------------------------------------------------
@@ -90,6 +93,7 @@ class Scene:
             self._dress(picture.theme)
             self._nodes.show(picture)
             self._panel.show(snapshot)
+            self._gizmo.show(picture, snapshot["nudging"])
         self._cameras.follow(picture, fits)
 
     def _move(self, before: Content, after: Content) -> None:

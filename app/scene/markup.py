@@ -49,7 +49,15 @@ def step(snapshot: Snapshot) -> str:
     )
     return _block(
         f'<div style="display:flex;flex-wrap:wrap;gap:4px 8px;align-items:center"><b>{names}</b>{badge}</div>'
+        + _reviewer(snapshot)
     )
+
+
+def _reviewer(snapshot: Snapshot) -> str:
+    """Whose decision the next one is, and the reason that goes with it."""
+    said = [f"You decide as {_text(snapshot['who'])}."] if snapshot["who"] else []
+    said += [f"Reason: {_text(snapshot['reason'])}"] if snapshot["reason"] else []
+    return f'<div style="{FAINT}">{" ".join(said)}</div>' if said else ""
 
 
 def value(snapshot: Snapshot) -> str:
@@ -59,6 +67,8 @@ def value(snapshot: Snapshot) -> str:
 
 def _judged(snapshot: Snapshot) -> str:
     criterion, threshold = snapshot["criterion"], snapshot["threshold"]
+    if snapshot["held"] or snapshot["origin"] == "nudged":
+        return _by_hand(snapshot)
     held = snapshot[criterion["quantity"]]
     if snapshot["behind"] is not None and snapshot["above"] is None:
         return (
@@ -74,6 +84,20 @@ def _judged(snapshot: Snapshot) -> str:
         f'<span style="{FAINT}">of {_amount(threshold, criterion)}</span></div>'
     )
     return told + _bar(held, threshold, colour, criterion["maximum"]) + _doubts(snapshot, colour)
+
+
+def _by_hand(snapshot: Snapshot) -> str:
+    """What the place is worth where the second scan is held, or was laid by hand."""
+    what = "value" if snapshot["score"] is None else "score"
+    behind = snapshot["behind"]
+    compared = (
+        "" if behind is None else f"{abs(behind):.2f} m {'less' if behind >= 0.0 else 'more'} than the best found"
+    )
+    where = "held by hand" if snapshot["held"] else "laid by hand"
+    return (
+        f'<div style="{NUMBERS}"><span style="font-size:1.5em;font-weight:650">{_number(snapshot[what], 2)} m</span> '
+        f'<b>{what}</b>, {where}</div><div style="{FAINT};{NUMBERS}">{compared}</div>'
+    )
 
 
 def _side(snapshot: Snapshot, held: float) -> tuple[str, str]:
@@ -136,12 +160,14 @@ def _evidence(snapshot: Snapshot) -> str:
 
 def candidate(snapshot: Snapshot) -> str:
     """Rank and pose of the candidate that is shown."""
+    if snapshot["held"]:
+        return _block(f'<b>Held by hand</b><div style="{NUMBERS}">{_pose(snapshot["pose"])}</div>')
     if snapshot["candidate"] is None:
         return _block(f'<span style="{FAINT}">No candidate</span>')
     rank = f"<b>Candidate {snapshot['candidate'] + 1}</b> of {snapshot['candidates']}"
     (a, b), (c, d) = snapshot["angles"]
     if snapshot["origin"] != "found":
-        said = {"claimed": "claimed", "nudged": "laid by hand"}[snapshot["origin"]]
+        said = "laid by hand" if snapshot["origin"] == "nudged" else "claimed"
         return _block(f'{rank}<div style="{NUMBERS}">{_pose(snapshot["pose"])}</div><div style="{FAINT}">{said}</div>')
     said = f"segment {a} laid on segment {c}" if a == b else f"angle of segments {a}, {b} on that of {c}, {d}"
     angles = f'<div style="{FAINT}">{said}</div>'
@@ -225,18 +251,22 @@ def picked(snapshot: Snapshot) -> str:
     told = snapshot["picked"]
     if told is None:
         return _block(f'<span style="{FAINT}">Click a segment to see what it adds to the value.</span>')
+    if told["source"] == "chain":
+        return _block(f"<b>The segments of a chain</b><div>{_chain(told['chain'])}</div>")
     size = f"{told['length']:.2f} m long, heading {_number(told['heading'], 1)}°"
     if "adds" not in told:
         return _block(_wall(told, size))
     head = f"<b>Segment {told['segment']}</b> of {_text(told['name'])}, {size}"
     if told["chain"] is None:
         return _block(f"{head}<div>matches nothing: it adds 0 m</div>")
-    chain = told["chain"]
-    swatch = f'<span style="display:inline-block;width:10px;height:10px;background:{_text(chain["colour"])}"></span>'
     adds = f"<div>adds <b>{told['adds']:.2f} m</b> of {snapshot['value']:.2f} m</div>"
     partners = ", ".join(f"{match['segment']} ({match['value']:.2f} m)" for match in told["matches"])
-    whole = f"{swatch} chain {chain['number']}: {_count(chain['segments'], 'segment')}, {chain['value']:.2f} m"
-    return _block(f"{head}{adds}<div>matches {partners}</div><div>{whole}</div>")
+    return _block(f"{head}{adds}<div>matches {partners}</div><div>{_chain(told['chain'])}</div>")
+
+
+def _chain(chain: Mapping[str, Any]) -> str:
+    swatch = f'<span style="display:inline-block;width:10px;height:10px;background:{_text(chain["colour"])}"></span>'
+    return f"{swatch} chain {chain['number']}: {_count(chain['segments'], 'segment')}, {chain['value']:.2f} m"
 
 
 def _wall(told: Mapping[str, Any], size: str) -> str:

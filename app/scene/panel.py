@@ -23,6 +23,7 @@ HERE = "● "
 """before the name of the stage and the dimension that are shown"""
 PREVIOUS, NEXT, FIT = "‹ Previous", "Next ›", "Fit"
 DIMENSIONS = ("2D", "3D", FIT)
+BY_HAND, HAND_OFF = "Lay by hand", "Stop laying by hand"
 
 HOTKEYS: tuple[tuple[str, str, str | None, str], ...] = (
     ("Next pair", "J", None, "next"),
@@ -38,6 +39,7 @@ HOTKEYS: tuple[tuple[str, str, str | None, str], ...] = (
     ("Skip: decide later", "L", None, "skip"),
     ("Undo", "U", None, "undo"),
     ("Redo", "R", None, "redo"),
+    ("Lay the second scan by hand", "G", None, "toggle_nudging"),
     ("2D or 3D", "V", None, "toggle_dimension"),
     ("Fit everything into the window", "F", None, "fit"),
     ("Measure between two clicks", "M", None, "toggle_measuring"),
@@ -70,6 +72,7 @@ class Panel:
     def _add_choices(self) -> None:
         self._candidate = self._gui.add_html("")
         self._group("Candidate", {PREVIOUS: "previous_candidate", NEXT: "next_candidate"}, "Keys P and N")
+        self._hand = self._button(BY_HAND, "gray", viser.Icon.HAND_MOVE, "toggle_nudging", "Drag the second scan (G)")
         self._gui.add_divider()
         self._heuristics = self._gui.add_html("")
         self._group("Heuristic", {PREVIOUS: "previous_heuristic", NEXT: "next_heuristic"}, "Keys Shift+H and H")
@@ -136,6 +139,8 @@ class Panel:
         _mark(self._dimensions, DIMENSIONS, f"{snapshot['dimension']}D")
         _enable(self._accept, snapshot["candidate"] is not None)
         _enable(self._reject, snapshot["row"] is not None)
+        _enable(self._hand, snapshot["row"] is not None)
+        _relabel(self._hand, HAND_OFF if snapshot["nudging"] else BY_HAND)
         self._show_layers(snapshot["layers"])
 
     @staticmethod
@@ -169,6 +174,11 @@ def _mark(group: viser.GuiButtonGroupHandle, names: tuple[str, ...], here: str) 
     options = tuple(HERE + name if name == here else name for name in names)
     if tuple(group.options) != options:
         group.options = options
+
+
+def _relabel(button: viser.GuiButtonHandle, label: str) -> None:
+    if button.label != label:
+        button.label = label
 
 
 def _enable(button: viser.GuiButtonHandle, on: bool) -> None:

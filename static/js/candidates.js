@@ -31,6 +31,10 @@ export class Candidates {
     this.view = view;
     this.#candidates = (match?.ranked ?? []).map((found, rank) => ({ ...found, rank, claimed: rank === claimed, nudged: rank === nudged, pose: pose(found.T_1_2) }));
     text(byId("candidates-note"), note(match, this.#candidates.length));
+    const words = ambiguity(this.#candidates);
+    byId("candidates-ambiguity").hidden = words === null;
+    if (words) Object.assign(byId("candidates-ambiguity").dataset, { how: words.how });
+    text(byId("candidates-ambiguity"), words?.sentence);
     this.table.hidden = this.#candidates.length === 0;
     this.table.classList.toggle("unscored", match?.mode === "paper");
     this.#draw();
@@ -38,7 +42,7 @@ export class Candidates {
 
   /** Mark the candidate the scene shows. */
   mark({ snapshot }) {
-    const rank = String(snapshot.candidate ?? 0);
+    const rank = snapshot.held ? null : String(snapshot.candidate ?? 0);
     for (const row of this.body.rows) {
       const chosen = row.dataset.rank === rank;
       if (chosen && row.getAttribute("aria-selected") !== "true") reveal(row, byId("panel-candidates"));
@@ -113,6 +117,29 @@ function line(candidate) {
   const cells = COLUMNS.map((column) => h("td", {}, String(column.show(candidate))));
   return h("tr", { "data-rank": candidate.rank, "aria-selected": "false" }, cells);
 }
+
+const APART = { metres: 0.5, radians: 0.2 };
+const CLOSE = 0.8;
+const RIVAL = 0.5;
+
+/** How near the best answer that is another one comes to the best: one peak, or several? */
+function ambiguity(candidates) {
+  const found = candidates.filter((c) => !c.claimed && !c.nudged);
+  const [best] = found;
+  if (!best) return null;
+  const merit = (c) => c.score ?? c.value;
+  const rival = found.find((c) => apart(best.pose, c.pose));
+  if (!rival || merit(best) <= 0) return { how: "clear", sentence: "No other candidate says something else." };
+  const share = Math.max(0, merit(rival) / merit(best));
+  const how = share >= CLOSE ? "ambiguous" : share >= RIVAL ? "rival" : "clear";
+  const word = { ambiguous: "Ambiguous", rival: "There is a rival", clear: "Clear" }[how];
+  const [far, turn] = [Math.hypot(rival.pose.x - best.pose.x, rival.pose.y - best.pose.y), turned(best.pose, rival.pose)];
+  const what = best.score === null ? "value" : "score";
+  return { how, sentence: `${word}: candidate ${rival.rank + 1}, ${fixed(far, 1)} m and ${degrees(turn)}° from the best, has ${fixed(100 * share, 0)} % of its ${what}.` };
+}
+
+const turned = (a, b) => Math.abs(Math.atan2(Math.sin(a.theta - b.theta), Math.cos(a.theta - b.theta)));
+const apart = (a, b) => Math.hypot(a.x - b.x, a.y - b.y) > APART.metres || turned(a, b) > APART.radians;
 
 function note(match, kept) {
   if (!match) return "";

@@ -16,8 +16,9 @@ export class Detail {
     Object.assign(this, { project, view, panels });
     view.addEventListener("changed", () => this.#follow());
     project.addEventListener("match", ({ detail }) => this.#shown && detail.integration === view.integration && this.load());
-    project.addEventListener("parameters", () => this.#forget());
+    project.addEventListener("parameters", ({ detail }) => this.#forget(detail));
     project.addEventListener("graph", () => this.#shown && this.load());
+    project.addEventListener("decided", ({ detail }) => this.#shown && detail.includes(view.integration) && this.load());
     project.addEventListener("rows", () => this.#head());
   }
 
@@ -27,8 +28,9 @@ export class Detail {
     this.#loading = new AbortController();
     const { integration, snapshot, project } = this.view;
     if (!integration) return;
+    const signal = this.#loading.signal;
     try {
-      const detail = await project.detail(integration, snapshot.heuristic, this.#loading.signal);
+      const detail = await (snapshot.trial ? this.view.detail(signal) : project.detail(integration, snapshot.heuristic, signal));
       for (const panel of this.panels) panel.show(detail, this.view);
       this.#reasons(detail);
     } catch (error) {
@@ -37,14 +39,18 @@ export class Detail {
   }
 
   /** Another mode may not know this heuristic: load again once the view has said what it shows now. */
-  #forget() {
+  #forget(revision) {
     this.#shown = "";
-    setTimeout(() => this.#shown === "" && this.#follow(), PATIENCE);
+    this.#since = revision;
+    setTimeout(() => this.#shown === "" && this.view.check().catch((error) => this.project.tell("trouble", error)), PATIENCE);
   }
+
+  #since = 0;
 
   #follow() {
     const { integration, snapshot } = this.view;
-    const wanted = `${integration} ${snapshot.heuristic ?? ""}`;
+    if ((snapshot.revision ?? 0) < this.#since) return;
+    const wanted = `${integration} ${snapshot.heuristic ?? ""} ${snapshot.trial?.number ?? ""}`;
     this.#head();
     if (wanted === this.#shown) for (const panel of this.panels) panel.mark(this.view);
     else this.load();
@@ -73,7 +79,7 @@ export class Detail {
   #clearing(row) {
     const button = byId("detail-clear");
     button.hidden = row.state !== "accepted" && row.state !== "rejected";
-    button.onclick = () => this.project.decide([row.id], "undecided").catch((error) => this.project.tell("trouble", error));
+    button.onclick = () => this.view.decideMany([row.id], "undecided").catch((error) => this.project.tell("trouble", error));
   }
 
   #reasons({ row, match }) {

@@ -52,5 +52,5 @@ export function setIcon(svg, name) {
 export const byId = (id) => document.getElementById(id);
 
 function present(children) {
-  return children.flat().filter((child) => child !== null && child !== undefined && child !== false);
+  return children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false);
 }

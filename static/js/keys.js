@@ -8,6 +8,7 @@ export const KEYS = [
     ["J", "next in the queue", "next"],
     ["K", "previous in the queue", "previous"],
     ["L", "skip: decide later", "skip"],
+    ["Enter", "from the queue to its candidates", "enter"],
     ["/", "search the queue", "search"],
   ]],
   ["Candidates and heuristics", [
@@ -19,6 +20,8 @@ export const KEYS = [
   ["Decide", [
     ["Y", "accept", "accept"],
     ["X", "reject", "reject"],
+    ["C", "say why: a reason kept with the decision", "reason"],
+    ["G", "lay the second scan by hand, or stop", "toggle_nudging"],
     ["U", "undo", "undo"],
     ["R", "redo", "redo"],
   ]],
@@ -29,25 +32,30 @@ export const KEYS = [
     ["V", "2D or 3D", "toggle_dimension"],
     ["F", "fit everything into the window", "fit"],
     ["M", "measure between two clicks", "toggle_measuring"],
+    ["Escape", "from anywhere back to the queue", "queue"],
     ["?", "this sheet", "help"],
   ]],
 ];
 
-/** Call `actions[name]()` on its key, except while somebody types or a dialogue is open. */
-export function listen(actions) {
+/** Call `actions[name]()` on its key, except while somebody types or a dialogue is open; `root` is a window. */
+export function listen(actions, root = window) {
   const names = new Map(KEYS.flatMap(([, keys]) => keys.map(([key, , name]) => [key, name])));
-  document.addEventListener("keydown", (event) => {
+  const hear = (event) => {
     if (typing(event)) return;
     const name = names.get(pressed(event));
-    if (!actions[name] || (event.repeat && DELIBERATE.has(name))) return;
+    if (!actions[name] || LOCAL.has(name)) return;
     event.preventDefault();
-    actions[name](event.key);
-  });
+    if (root !== window) event.stopImmediatePropagation();
+    if (!(event.repeat && DELIBERATE.has(name))) actions[name](event.key);
+  };
+  root.addEventListener("keydown", hear, root !== window);
 }
 
 const CAMERA =
-  "The same keys work in the scene, after a click into it. W A S D Q E and the arrows move its camera; drag to pan, scroll to zoom.";
-const DELIBERATE = new Set(["accept", "reject", "undo", "redo", "skip"]);
+  "The keys do the same wherever you are, in the page and in the scene. In the scene W A S D Q E and the arrows move the camera; drag to pan, scroll to zoom, click a segment to see what it adds.";
+const DELIBERATE = new Set(["accept", "reject", "undo", "redo", "skip", "toggle_nudging"]);
+/** Those that the queue itself answers. */
+const LOCAL = new Set(["enter"]);
 
 /** Fill the help sheet. */
 export function sheet(dialog) {

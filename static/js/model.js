@@ -9,7 +9,7 @@ const DECISION_PAUSE = 60;
 
 const VALUE = { parameter: "value_threshold", quantity: "value", unit: "m", maximum: null, step: 0.05 };
 
-/** Tells "info", "rows", "progress", "match", "graph", "search", "searched", "map", "parameters", "deleted" and "trouble" as events. */
+/** Tells "info", "rows", "progress", "match", "graph", "search", "searched", "map", "parameters", "decided", "deleted" and "trouble" as events. */
 export class Project extends EventTarget {
   #said = false;
 
@@ -98,8 +98,9 @@ export class Project extends EventTarget {
   hear(event) {
     if (event.type === "match") this.#matched(event);
     else if (event.type === "progress") this.#progressed(event);
-    else if (event.type === "parameters") this.refresh(), this.tell("parameters");
+    else if (event.type === "parameters") this.refresh(), this.tell("parameters", event.revision ?? 0);
     else if (event.type === "decision") this.#decided(event);
+    else if (event.type === "later") this.#put(event.rows), this.redraw(0), this.refreshRows();
     else if (event.type === "hello" || event.type === "log") this.refresh();
     else if (event.type === "graph") this.refresh(), this.tell("graph");
     else if (event.type === "search") this.#searched(event);
@@ -157,11 +158,12 @@ export class Project extends EventTarget {
     this.tell("match", event);
   }
 
-  #decided({ rows = [], revision, undo, redo }) {
+  #decided({ rows = [], integrations = [], revision, undo, redo }) {
     Object.assign(this.info, { revision, undo, redo });
     this.tell("info");
     this.#put(rows);
     this.redraw(0);
+    this.tell("decided", integrations);
     this.refresh();
   }
 

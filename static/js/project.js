@@ -7,6 +7,7 @@ import { exportMenu } from "./exports.js";
 import { GraphWords, graphPanel, integrationLinks } from "./graph.js";
 import { head } from "./head.js";
 import { Heuristics } from "./heuristics.js";
+import { reviewer, reasons } from "./reviewer.js";
 import { inputs } from "./inputs.js";
 import { restore } from "./keeping.js";
 import { listen, sheet } from "./keys.js";
@@ -24,6 +25,7 @@ import { tabs } from "./tabs.js";
 import { Threshold } from "./threshold.js";
 import { View } from "./view.js";
 import { walkLink } from "./walks.js";
+import { Why } from "./why.js";
 
 const project = new Project(decodeURIComponent(location.pathname.split("/")[2] ?? ""));
 const view = new View(project);
@@ -35,13 +37,16 @@ start().catch(unavailable);
 
 async function start() {
   prepare(byId("detail-state"));
-  new Detail(project, view, [candidates, new Heuristics(project), new GraphWords(project)]);
-  new Threshold(project, queue);
-  new ParameterDrawer(project);
-  for (const part of [head, summary, exportMenu, inputs, loops, mapTools, graphPanel, walkLink]) part(project, view);
+  new Detail(project, view, [candidates, new Heuristics(project), new GraphWords(project), new Why(view)]);
+  new Threshold(project, view, queue);
+  new ParameterDrawer(project, view);
+  const parts = [reviewer, reasons, head, summary, exportMenu, inputs, loops, mapTools, graphPanel, walkLink];
+  for (const part of parts) part(project, view);
   project.addEventListener("trouble", ({ detail }) => failed(detail));
   integrationLinks(byId("panel-map"), (id) => queue.select(id));
-  keyboard();
+  sheet(byId("help"));
+  byId("help-open").addEventListener("click", help);
+  listen(actions());
   await project.load();
   byId("workbench").setAttribute("aria-busy", "false");
   await connect();
@@ -51,7 +56,7 @@ async function start() {
 async function connect() {
   const stream = new Stream({ hear, lost, back, refused: () => again(stream) });
   project.addEventListener("deleted", () => gone(stream));
-  scene(view, { "?": help, "/": search, Escape: () => byId("queue").focus() });
+  scene(view, actions());
   view.addEventListener("opened", () => listenTo(stream));
   view.addEventListener("changed", remember);
   addEventListener("pagehide", () => view.close());
@@ -128,18 +133,18 @@ function remember() {
   if (row) announce(`${pair(row.id)}, ${stateLabel(row.state)}`);
 }
 
-function keyboard() {
-  sheet(byId("help"));
-  byId("help-open").addEventListener("click", help);
+/** What each key does, in the page and in the scene. */
+function actions() {
   const act = (action) => () => view.act(action).catch(failed);
-  const actions = { next: () => queue.turn(1), previous: () => queue.turn(-1), search, help };
-  for (const name of ["accept", "reject"]) actions[name] = () => view.act(name, view.integration).catch(failed);
-  for (const name of ["skip", "undo", "redo", "toggle_dimension", "toggle_measuring", "fit"]) actions[name] = act(name);
+  const actions = { next: () => queue.turn(1), previous: () => queue.turn(-1), search, help, reason, queue: toQueue, enter: () => {} };
+  for (const name of ["accept", "reject"]) actions[name] = () => view.decide(name).catch(failed);
+  const plain = ["skip", "undo", "redo", "toggle_dimension", "toggle_nudging", "toggle_measuring", "fit"];
+  for (const name of plain) actions[name] = act(name);
   actions.stage = (number) => view.snapshot.stages && view.act("set_stage", view.snapshot.stages[number - 1]).catch(failed);
   for (const what of ["candidate", "heuristic", "stage"]) {
     for (const way of ["next", "previous"]) actions[`${way}_${what}`] = act(`${way}_${what}`);
   }
-  listen(actions);
+  return actions;
 }
 
 function help() {
@@ -147,9 +152,24 @@ function help() {
 }
 
 function search() {
+  type(byId("search"));
+}
+
+function reason() {
+  showTab("tab-candidates");
+  type(byId("reason"));
+}
+
+function toQueue() {
   window.focus();
-  byId("search").select();
-  byId("search").focus();
+  byId("queue").focus();
+}
+
+/** Bring the keyboard into a field, from the scene too. */
+function type(field) {
+  window.focus();
+  field.select();
+  field.focus();
 }
 
 /** The project cannot be shown at all: say why, and lead back. */

@@ -1,11 +1,12 @@
 // The review queue: the integrations in the server's order, the one that most needs a person first.
 
 import { byId, fill, h, icon, set, setIcon, text } from "./dom.js";
-import { count, measured, pair, whole } from "./format.js";
+import { count, measured, metres, pair, whole } from "./format.js";
 import { off } from "./graph.js";
 import { VirtualList } from "./virtual.js";
 
 const HEIGHT = 34;
+const TELL = 150;
 const STATES = {
   pending: { label: "to decide", icon: "open" },
   accepted: { label: "accepted", icon: "check" },
@@ -17,16 +18,20 @@ const STATES = {
 const FILTERS = [
   ["all", "All", () => true],
   ["pending", "Open", (row) => row.state === "pending"],
+  ["later", "Later", (row) => row.later],
   ["accepted", "Accepted", (row) => row.state === "accepted"],
   ["rejected", "Rejected", (row) => row.state === "rejected"],
   ["loops", "Loops", (row) => row.kind !== "neighbour"],
   ["silenced", "Silenced", (row) => row.silenced],
+  ["nudged", "By hand", (row) => row.origin === "nudged"],
   ["none", "None", (row) => row.state === "none" || row.state === "failed"],
 ];
 
 const KINDS = { closure: "loop closure", imported: "imported", manual: "by hand", neighbour: "" };
 const ORDERS = {
   doubt: null,
+  quantity: (a, b, project) => (project.quantity(a) ?? Infinity) - (project.quantity(b) ?? Infinity),
+  contradicted: (a, b) => (b.contradicted ?? -1) - (a.contradicted ?? -1),
   residual: (a, b) => (b.residual ?? -1) - (a.residual ?? -1),
   scans: (a, b) => compare(scans(a), scans(b)),
 };
@@ -48,7 +53,9 @@ export class Queue {
     this.box = byId("queue");
     this.list = new VirtualList(this.box, { height: HEIGHT, make: makeRow, draw: (element, row) => this.#draw(element, row), key: (row) => row.id });
     this.#controls();
-    project.addEventListener("rows", () => this.refresh());
+    view.addEventListener("opened", () => ((this.#told = null), this.#tellOrder()));
+    for (const event of ["pointerdown", "keydown", "wheel"]) addEventListener(event, () => (this.#touched = true), { once: true, capture: true });
+    project.addEventListener("rows", () => (this.refresh(), this.#begin()));
     project.addEventListener("info", () => project.info.threshold === this.#threshold || this.refresh());
     view.addEventListener("changed", () => this.#follow());
   }
@@ -62,7 +69,8 @@ export class Queue {
   refresh() {
     const test = FILTERS.find(([name]) => name === this.#filter)[2];
     this.#shown = this.project.rows.filter((row) => test(row) && found(row, this.#search));
-    if (ORDERS[this.#order]) this.#shown.sort(ORDERS[this.#order]);
+    const order = ORDERS[this.#order];
+    if (order) this.#shown.sort((a, b) => order(a, b, this.project));
     this.#threshold = this.project.info?.threshold ?? 0;
     this.#scale = this.project.criterion.maximum ?? scale(this.project, this.#threshold);
     this.list.show(this.#shown, this.view.integration);
@@ -70,7 +78,34 @@ export class Queue {
     this.#needs();
     this.#empty();
     this.#mark();
+    this.#tellOrder();
   }
+
+  /** The scene steps through what is listed here too: tell the view, where that is not simply the whole queue. */
+  #tellOrder() {
+    const whole = this.#filter === "all" && !this.#search && this.#order === "doubt";
+    const ids = whole ? null : this.#shown.map((row) => row.id);
+    const words = JSON.stringify(ids);
+    clearTimeout(this.#telling);
+    if (words === this.#told || this.view.id === null) return;
+    const tell = () => ((this.#told = words), this.view.act("set_order", ids).catch((error) => this.project.tell("trouble", error)));
+    this.#telling = setTimeout(tell, TELL);
+  }
+
+  /** Matching is over and nobody has touched anything: begin with what has turned out to be the most doubtful. */
+  #begin() {
+    if (this.#begun || this.#touched || this.project.rows.some((row) => row.state === "matching")) return;
+    this.#begun = true;
+    const first = this.project.rows[0];
+    if (first && this.view.integration && !this.linked && this.view.integration !== first.id) this.select(first.id);
+  }
+
+  #told = null;
+  #telling = 0;
+  #touched = false;
+  #begun = false;
+  /** Whether the address named an integration: then that is looked at. */
+  linked = location.hash.length > 1;
 
   /** Mark the rows another threshold would flip. */
   preview(flips) {
@@ -174,9 +209,9 @@ export class Queue {
   }
 
   #draw(element, row) {
-    const [state, id, bar, value, note] = element.children;
+    const [state, id, bar, value, seen, note] = element.children;
     Object.assign(element.dataset, { id: row.id, state: row.state, verdict: row.verdict ?? "", kind: row.kind });
-    element.title = [KINDS[row.kind], row.residual === null ? "" : `${off(row.residual, row.turn)} off the graph`].filter(Boolean).join(", ");
+    element.title = hint(row);
     element.id = `row-${row.id}`;
     setIcon(state.firstElementChild, stateIcon(row.state));
     text(state.lastElementChild, stateLabel(row.state));
@@ -184,6 +219,7 @@ export class Queue {
     const quantity = row.state === "none" ? null : this.project.quantity(row);
     drawBar(bar, quantity, this.#scale, this.#threshold);
     text(value, quantity === null ? "" : measured(quantity, this.project.criterion.unit));
+    drawEvidence(seen, row);
     this.#note(note, row);
     set(element, "aria-selected", String(row.id === this.view.integration));
   }
@@ -192,18 +228,38 @@ export class Queue {
     const flip = this.#flips.passes.has(row.id) ? "would pass" : this.#flips.fails.has(row.id) ? "would fail" : "";
     const graph = row.silenced ? "silenced" : "";
     note.className = flip ? `note ${flip.replace(" ", "-")}` : `note ${graph}`;
-    text(note, flip || graph || (row.state === "pending" ? PROPOSALS[row.verdict] : SHORT[row.state]) || row.heuristic);
+    text(note, flip || graph || (row.state === "pending" ? (row.later ? "later" : PROPOSALS[row.verdict]) : SHORT[row.state]) || row.who || row.heuristic);
   }
 }
 
-const RARE = new Set(["loops", "silenced"]);
+const RARE = new Set(["loops", "silenced", "later", "nudged"]);
 const PROPOSALS = { accepted: "→ accept", review: "→ look", rejected: "→ reject" };
 const SHORT = { none: "none found", failed: "failed", matching: "matching" };
 
 function makeRow() {
   const state = h("span.state", {}, icon("open"), h("span.only-read"));
   const bar = h("span.bar", { "aria-hidden": "true" }, h("i.fill"), h("i.limit"));
-  return h("div.item", { role: "option" }, state, h("span.pair"), bar, h("span.value"), h("span.note"));
+  const seen = h("span.seen", {}, h("i.supported", { "aria-hidden": "true" }), h("i.contradicted", { "aria-hidden": "true" }), h("span.only-read"));
+  return h("div.item", { role: "option" }, state, h("span.pair"), bar, h("span.value"), seen, h("span.note"));
+}
+
+/** What both scans see against what one denies of the other, as shares of a bar. */
+function drawEvidence(seen, { supported, contradicted }) {
+  const known = supported !== null && supported !== undefined;
+  const all = known ? supported + contradicted || 1 : 1;
+  seen.children[0].style.width = known ? `${(100 * supported) / all}%` : "0";
+  seen.children[1].style.width = known ? `${(100 * contradicted) / all}%` : "0";
+  text(seen.lastElementChild, known ? told(supported, contradicted) : "");
+}
+
+const told = (supported, contradicted) => `${metres(supported, 1)} seen by both, ${metres(contradicted, 1)} contradicted`;
+
+function hint(row) {
+  const by = row.who ? `${stateLabel(row.state)} by ${row.who}` : "";
+  const graph = row.residual === null ? "" : `${off(row.residual, row.turn)} off the graph`;
+  const seen = row.supported === null ? "" : told(row.supported, row.contradicted);
+  const hand = row.origin === "nudged" ? "laid by hand" : "";
+  return [KINDS[row.kind], hand, by, seen, graph, row.reason].filter(Boolean).join(", ");
 }
 
 function drawBar(bar, quantity, scale, threshold) {

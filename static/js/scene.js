@@ -1,11 +1,12 @@
 // The scene in the middle: an iframe of our own address.
 
 import { byId, text } from "./dom.js";
+import { listen } from "./keys.js";
 
 const DARK = matchMedia("(prefers-color-scheme: dark)");
 
-/** Show the scene of a view, each time the view is opened; `keys` are those the page answers when the scene has the keyboard. */
-export function scene(view, keys) {
+/** Show the scene of a view, each time the view is opened; `actions` answer the keys there as they do in the page. */
+export function scene(view, actions) {
   const frame = byId("scene");
   view.addEventListener("opened", () => {
     cover("Loading the scene…");
@@ -13,7 +14,7 @@ export function scene(view, keys) {
     theme(view);
   });
   DARK.addEventListener("change", () => theme(view));
-  frame.addEventListener("load", () => loaded(frame, keys));
+  frame.addEventListener("load", () => loaded(frame, actions));
 }
 
 /** The colours of the scene follow the browser's, as those of the page do. */
@@ -29,13 +30,11 @@ export function cover(sentence, again = null) {
   text(byId("scene-cover-text"), sentence);
 }
 
-function loaded(frame, keys) {
+/** The page answers the scene's keys, before the scene does: so that both do the same on the same list. */
+function loaded(frame, actions) {
   const inside = frame.contentDocument;
   if (!inside || inside.URL === "about:blank") return;
   const there = inside.querySelector("#root, canvas");
   cover(there ? "" : "The scene could not be loaded.", there ? null : () => frame.contentWindow.location.reload());
-  inside.addEventListener("keydown", (event) => {
-    if (event.target.closest?.("input, textarea") || event.ctrlKey || event.metaKey) return;
-    keys[event.key]?.();
-  });
+  listen(actions, frame.contentWindow);
 }

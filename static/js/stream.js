@@ -1,6 +1,6 @@
 // The one stream of events of a page.
 
-const TYPES = ["match", "decision", "progress", "graph", "search", "map", "parameters", "view", "log", "project", "deleted", "error"];
+const TYPES = ["match", "decision", "progress", "graph", "search", "map", "parameters", "later", "view", "log", "project", "deleted", "error"];
 const AGAIN = 2000;
 
 /** Listens to server-sent events, and goes on listening when the server has been away. */

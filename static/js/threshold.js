@@ -14,15 +14,15 @@ export class Threshold {
   #timer = 0;
   #flips = NO_FLIPS;
 
-  constructor(project, queue) {
-    Object.assign(this, { project, queue });
+  constructor(project, view, queue) {
+    Object.assign(this, { project, view, queue });
     this.slider = byId("threshold");
     this.exact = byId("threshold-exact");
     this.slider.addEventListener("input", () => this.#preview(Number(this.slider.value)));
     this.slider.addEventListener("change", () => this.#set(Number(this.slider.value)));
     this.exact.addEventListener("change", () => this.exact.checkValidity() && this.#set(Number(this.exact.value)));
-    byId("accept-above").addEventListener("click", () => this.#decide("accepted"));
-    byId("reject-below").addEventListener("click", () => this.#decide("rejected"));
+    this.#bulk("accept-above", "accepted");
+    this.#bulk("reject-below", "rejected");
     project.addEventListener("info", () => this.#moved());
     project.addEventListener("rows", () => this.#draw());
   }
@@ -70,6 +70,29 @@ export class Threshold {
     const { above, below } = this.#sides();
     this.#button("accept-above", above.length, `Accept ${whole(above.length)} above`);
     this.#button("reject-below", below.length, `Reject ${whole(below.length)} below`);
+  }
+
+  /** Say, as long as the button is pointed at, or has the keyboard, what it would decide. */
+  #bulk(id, verdict) {
+    const button = byId(id);
+    button.addEventListener("click", () => this.#decide(verdict));
+    for (const event of ["pointerenter", "focus"]) button.addEventListener(event, () => this.#foresee(verdict));
+    for (const event of ["pointerleave", "blur"]) button.addEventListener(event, () => this.#asking === null && this.#unmark());
+  }
+
+  #foresee(verdict) {
+    const ids = this.#sides()[verdict === "accepted" ? "above" : "below"];
+    if (this.#asking !== null || ids.length === 0) return;
+    const accepting = verdict === "accepted";
+    const one = part(accepting ? "would-pass" : "would-fail", ids, accepting ? "would be accepted" : "would be rejected");
+    fill(byId("threshold-preview"), one);
+    const marked = new Set(ids);
+    this.queue.preview({ passes: accepting ? marked : new Set(), fails: accepting ? new Set() : marked });
+  }
+
+  #unmark() {
+    fill(byId("threshold-preview"));
+    this.queue.preview(this.#flips);
   }
 
   #button(id, number, label) {
@@ -142,9 +165,10 @@ export class Threshold {
     const { above, below } = this.#sides();
     const ids = verdict === "accepted" ? above : below;
     try {
-      await this.project.decide(ids, verdict);
+      await this.view.decideMany(ids, verdict);
+      this.#unmark();
       const word = verdict === "accepted" ? "Accepted" : "Rejected";
-      notice(`${word} ${count(ids.length, "integration")}.`, { action: { label: "Undo", run: () => this.project.undo().catch(failed) } });
+      notice(`${word} ${count(ids.length, "integration")}.`, { action: { label: "Undo", run: () => this.view.act("undo").catch(failed) } });
     } catch (error) {
       failed(error);
     }

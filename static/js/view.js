@@ -39,6 +39,18 @@ export class View extends EventTarget {
     if (this.#idle) this.apply(snapshot);
   }
 
+  /** Accept or reject what is shown here; the server tells where somebody has decided on it since. */
+  decide(verdict) {
+    const { integration, revision } = this.snapshot;
+    return this.act(verdict, { integration, revision });
+  }
+
+  /** Decide many in one step, on the best candidates of each; where there is no view, the project does it. */
+  decideMany(integrations, verdict) {
+    if (this.id === null) return this.project.decide(integrations, verdict);
+    return this.act("decide_many", { integrations, verdict, revision: this.project.info.revision });
+  }
+
   /** Select an integration: shown at once; of many quick selections only the last is sent, and only its answer counts. */
   async select(id) {
     this.apply({ ...this.snapshot, integration: id, candidate: 0 });
@@ -69,6 +81,16 @@ export class View extends EventTarget {
       if (error.status !== 404) throw error;
       await this.open();
     }
+  }
+
+  /** Why the candidate shown has its value and its score. */
+  explanation(signal) {
+    return this.id === null ? null : get(`${this.#url}/explanation`, { signal });
+  }
+
+  /** The selected integration in full, as the view has it: with parameters on trial, what those make of it. */
+  detail(signal) {
+    return get(`${this.#url}/detail`, { signal });
   }
 
   close() {

@@ -18,13 +18,14 @@ export class VirtualList {
     new ResizeObserver(() => this.#paint(false)).observe(box);
   }
 
-  /** Show other items; `anchor`, the key of one of them, keeps its place on the screen when it is in sight. */
+  /** Show other items; `anchor`, the key of one of them, keeps its place on the screen when it is in sight: except at
+   *  the top of the list, where what comes first is what one wants to see. */
   show(items, anchor = null) {
     const before = this.#place(anchor);
     this.#items = items;
     this.canvas.style.height = `${items.length * this.height}px`;
     const after = this.#place(anchor);
-    if (before !== null && after !== null && this.#inSight(before)) this.box.scrollTop += after - before;
+    if (before !== null && after !== null && this.box.scrollTop > 0 && this.#inSight(before)) this.box.scrollTop += after - before;
     this.#paint(true);
   }
 

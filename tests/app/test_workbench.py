@@ -381,7 +381,7 @@ def test_the_map_stage_says_why_it_is_empty_and_then_is_not(view: View, session:
     ear = Ear(view)
     session.decide([here(view)], "accepted")
     ear.wait_for(lambda e: any(layer["name"] == "map" and "2 scans" in layer["caption"] for layer in e["layers"]))
-    assert view.snapshot()["messages"] == []
+    assert view.snapshot()["messages"] == [f"Somebody else accepted {here(view)}."]
     caption = next(layer["caption"] for layer in view.snapshot()["layers"] if layer["name"] == "map")
     assert "5 scans not placed" in caption
 
@@ -403,6 +403,12 @@ def test_every_action_can_be_asked_for_by_name(view: View, clock: Clock) -> None
         "set_colouring": "misfit",
         "set_compare": "given",
         "set_side": "over",
+        "set_who": "Ann",
+        "set_reason": "glass",
+        "decide_many": {"integrations": ["0.1-0.2"], "verdict": "accepted"},
+        "set_nudging": True,
+        "hold": {"x": 0.0, "y": 0.0, "theta": 0.0},
+        "lay": {"source": "first", "segment": 0},
     }
     deciding = ("accept", "reject", "undo", "redo")
     for action in (*deciding, *(name for name in ACTIONS if name not in deciding)):
