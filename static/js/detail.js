@@ -15,22 +15,28 @@ export class Detail {
   constructor(project, view, panels) {
     Object.assign(this, { project, view, panels });
     view.addEventListener("changed", () => this.#follow());
-    project.addEventListener("match", ({ detail }) => this.#shown && detail.integration === view.integration && this.load());
+    project.addEventListener("match", ({ detail }) => this.#shown && detail.integration === view.integration && this.#again());
     project.addEventListener("parameters", ({ detail }) => this.#forget(detail));
-    project.addEventListener("graph", () => this.#shown && this.load());
-    project.addEventListener("decided", ({ detail }) => this.#shown && detail.includes(view.integration) && this.load());
+    project.addEventListener("graph", () => this.#shown && this.#again());
+    project.addEventListener("decided", ({ detail }) => this.#shown && detail.includes(view.integration) && this.#again());
     project.addEventListener("rows", () => this.#head());
   }
 
+  /** Something about the selection has changed: the view knows by what it is looked at now, another mode may have come. */
+  #again() {
+    return this.load(this.view.id !== null);
+  }
+
   /** Fetch what is known of the selection; an answer to an earlier selection is dropped. */
-  async load() {
+  async load(asViewed = Boolean(this.view.snapshot.trial)) {
     this.#loading?.abort();
     this.#loading = new AbortController();
     const { integration, snapshot, project } = this.view;
     if (!integration) return;
     const signal = this.#loading.signal;
     try {
-      const detail = await (snapshot.trial ? this.view.detail(signal) : project.detail(integration, snapshot.heuristic, signal));
+      const detail = await (asViewed ? this.view.detail(signal) : project.detail(integration, snapshot.heuristic, signal));
+      if (detail.row.id !== this.view.integration) return;
       for (const panel of this.panels) panel.show(detail, this.view);
       this.#reasons(detail);
     } catch (error) {
