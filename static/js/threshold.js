@@ -85,13 +85,13 @@ export class Threshold {
     if (this.#asking !== null || ids.length === 0) return;
     const accepting = verdict === "accepted";
     const one = part(accepting ? "would-pass" : "would-fail", ids, accepting ? "would be accepted" : "would be rejected");
-    fill(byId("threshold-preview"), one);
+    fill(byId("bulk-preview"), one);
     const marked = new Set(ids);
     this.queue.preview({ passes: accepting ? marked : new Set(), fails: accepting ? new Set() : marked });
   }
 
   #unmark() {
-    fill(byId("threshold-preview"));
+    fill(byId("bulk-preview"));
     this.queue.preview(this.#flips);
   }
 
