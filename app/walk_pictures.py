@@ -82,7 +82,7 @@ def _placing(box: Sequence[float]) -> tuple[Place, float]:
 
 
 def _shape(draw: ImageDraw.ImageDraw, shape: Shape, walk: Walkthrough, place: Place) -> None:
-    colour = ROLES[shape["role"]]
+    colour = _faded(ROLES[shape["role"]]) if shape.get("faded") else ROLES[shape["role"]]
     rows = _rows(shape, walk)
     if shape["kind"] == "text":
         x, y = place(*rows)
@@ -93,6 +93,11 @@ def _shape(draw: ImageDraw.ImageDraw, shape: Shape, walk: Walkthrough, place: Pl
         joined = pairwise(rows) if shape["kind"] == "path" else ((r[:2], r[2:]) for r in rows)
         for start, end in joined:
             _line(draw, place(*start), place(*end), _px(shape.get("width", 2)), colour, dashed=bool(shape.get("dash")))
+
+
+def _faded(colour: str) -> str:
+    """A colour mixed into the white ground."""
+    return "#" + bytes(round(0.35 * channel + 0.65 * 255) for channel in bytes.fromhex(colour[1:])).hex()
 
 
 def _rows(shape: Shape, walk: Walkthrough) -> Any:

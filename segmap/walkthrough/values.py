@@ -231,7 +231,7 @@ class _Pairs:
         told += (metres("l2", term.common_2), ("penalty factor", f"{term.factor:.4f}", ""))
         told += (metres("matching value", term.value), metres("value so far", total))
         line, say = self._sentence(term, tolerances)
-        at = (round(tolerances, 3), round(term.factor, 4)) if line in ("16", "18") else None
+        at = (round(tolerances, 3), round(term.factor, 4)) if line == "16" else None
         return Step(line, say, tuple(shapes), told, box=self._box(i, j), at=at)
 
     def _sentence(self, term: PairTerm, tolerances: float) -> tuple[str, str]:
@@ -275,7 +275,9 @@ class _Pairs:
                 shapes.append(text((end + foot) / 2.0, name, "accent"))
             first, last = max(0.0, min(places)), min(length, max(places))
             if last > first:
-                covered.append(lines(np.concatenate((start + first * unit, start + last * unit)), "good", width=10))
+                covered.append(
+                    lines(np.concatenate((start + first * unit, start + last * unit)), "good", width=12, faded=True)
+                )
         return covered, shapes
 
     def _box(self, i: int, j: int) -> tuple[float, float, float, float] | None:

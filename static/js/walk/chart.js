@@ -41,7 +41,7 @@ function series({ values, x, y }, at) {
 
 function dots({ points, x, y, logarithmic }) {
   const along = points.map((point) => (logarithmic ? Math.log10(Math.max(1e-9, point.x)) : point.x));
-  const scale = axes(x, y, spread(along), spread([0, ...points.map((point) => point.y)]), logarithmic);
+  const scale = axes(x, y, spread(along), [0, 1.1 * Math.max(...points.map((point) => point.y), 1e-9)], logarithmic);
   const taken = [];
   const parts = points.flatMap((point, number) => {
     const place = scale.place(along[number], point.y);

@@ -88,6 +88,7 @@ function drawing(shape, base, place) {
   const rows = coordinates(shape, base);
   const attributes = { class: `shape ${shape.kind} role-${shape.role}` };
   if (shape.kind === "text") return label(shape, place(rows), attributes);
+  if (shape.faded) attributes["stroke-opacity"] = 0.35;
   if (shape.dash) attributes["stroke-dasharray"] = "6 4";
   if (shape.mark === "cross") return crosses(rows.map(place), shape.size ?? 8, attributes);
   attributes["stroke-width"] = shape.kind === "points" ? shape.size ?? 5 : shape.width ?? 2;
