@@ -49,8 +49,8 @@ def _angles_stage(which: int, name: str, event: Event, told: list[Event], parame
     return Stage(
         id=f"angles-{which}",
         title=f"Angles of map {which}",
-        about="An angle between two segments is a landmark that looks the same from everywhere. The heuristic"
-        f" '{name}' takes {ABOUT[name]}.",
+        about="An angle between two segments is a landmark that looks the same from everywhere. A heuristic is a rule"
+        f" that says which angles are worth trying: '{name}' takes {ABOUT[name]}.",
         algorithm="2",
         count=len(held.pairs) + 1,
         step=held.step,
@@ -97,8 +97,8 @@ class _Angles:
     def _idea(self) -> str:
         n, taken = len(self.map), self.count["taken"]
         return (
-            f"Map {self.which} has {n} segments, so {len(self.pairs)} pairs of them. Of these '{self.name}' takes"
-            f" {taken}: {ABOUT[self.name]}. {_LESSON[self.name]}"
+            f"Map {self.which} has {n} segments, so {len(self.pairs)} pairs of them. Of these {taken} give an angle:"
+            f" '{self.name}' takes {ABOUT[self.name]}, and segments nearly parallel form none. {_LESSON[self.name]}"
         )
 
     def _counts(self) -> tuple[Quantity, ...]:
@@ -107,7 +107,9 @@ class _Angles:
     def _sentence(self, i: int, j: int, state: str) -> str:
         pair = f"Segments {i} and {j}"
         if state == "taken":
-            return f"{pair}: their angle is kept. The dashed lines prolong both segments to their vertex."
+            return (
+                f"{pair}: their angle is kept. The dashed lines prolong both segments to where they meet, the vertex."
+            )
         if state == "without vertex":
             least = math.degrees(self.parameters.min_vertex_angle)
             return f"{pair} are within {least:.0f}° of parallel: their lines meet far away or nowhere, so no angle."
@@ -338,8 +340,8 @@ def _candidate_step(found: Found, k: int) -> Step:
     shapes += [of("second", "good", pair_2, T_1_2, width=3)]
     say = (
         f"Candidate {k + 1} of {len(found)}: the angle between segments {pair_2[0]} and {pair_2[1]} of map 2 (green) is"
-        f" laid on the angle between {pair_1[0]} and {pair_1[1]} of map 1 (marked). Vertex comes to lie on vertex, and"
-        " what little the angles differ is shared. Does the rest of orange fall on blue?"
+        f" laid on the angle between {pair_1[0]} and {pair_1[1]} of map 1 (marked). Vertex comes to lie on vertex; if"
+        " the angles differ a little, half of it goes to either side. Does the rest of orange fall on blue?"
     )
     off = degrees("they differ by", abs(float(wrap(size_1 - size_2))))
     told = (degrees("angle of map 1", size_1), degrees("angle of map 2", size_2), off, *pose)

@@ -49,8 +49,9 @@ def chains_stage(trace: Trace, maps: tuple[SegmentMap, SegmentMap], box: Box | N
     stage = Stage(
         id="chains",
         title="Chains",
-        about="A chain is everything that hangs together by matching: if segment a of one map matches b of the other,"
-        " and b matches c as well, then a, b and c are one wall. Each chain becomes one polyline.",
+        about="Under the best candidate some segments match. A chain is everything that hangs together by matching: if"
+        " segment a of one map matches b of the other, and b matches c as well, then a, b and c are one wall. Each"
+        " chain becomes one polyline.",
         algorithm="4",
         count=len(held.pairs) + 1,
         step=held.step,
@@ -138,7 +139,8 @@ def polylines_stage(trace: Trace, parameters: Parameters) -> list[Stage]:
         id="polylines",
         title="A polyline for each chain",
         about="The segments of a chain are the same wall seen twice, not quite alike. A polyline takes their place: it"
-        " begins as one line and is bent through the segment that lies farthest from it, until none lies far.",
+        " begins as one line and is bent through the segment that lies farthest from it, until none lies far. P0, P1,"
+        " ... are its states. The greedy way lets each segment bend it once, the plain way again and again.",
         algorithm="5",
         count=len(held.states),
         step=held.step,

@@ -126,8 +126,8 @@ class _Method:
     def _plan(self) -> Step:
         scans = [scan for part in self.made.components for scan in part.scans]
         say = (
-            f"{len(scans)} scans. The small picture shows which maps become one: each dot below the first row is an"
-            " integration. Click one to see it, then go into it."
+            f"{len(scans)} scans. The small picture shows which maps become one: each dot below the first row is a call"
+            " of INTEGRATE, which finds how two maps lie on each other and fuses them. Click one, then go into it."
         )
         if len(self.made.components) > 1:
             say += f" Not everything could be joined: {len(self.made.components)} maps are left."

@@ -84,11 +84,14 @@ class _Sight:
         shapes = self._walls()
         shapes += [points(self._places(which, name), name, size=4) for which in (0, 1) for name in CLASS_NAMES]
         say = (
-            f"{self.known_as}: every dot is a point that one sensor saw, coloured by what the other sensor says of the"
-            " place. Green is support, red contradiction; grey could not be judged."
+            f"{self.known_as}{self._use()}: every dot is a point that one sensor saw, coloured by what the other sensor"
+            " says of the place. Green is support, red contradiction; grey could not be judged."
         )
         score = () if self.told.score is None else (metres("score", self.told.score),)
         return Step("1", say, tuple(shapes), (*self._terms(), *score))
+
+    def _use(self) -> str:
+        return "" if self.known_as.startswith("The refined") else " (paper mode shows this, but does not use it)"
 
     def _terms(self) -> tuple[Quantity, ...]:
         held = self.told.evidence
@@ -104,8 +107,8 @@ class _Sight:
         term = (self.told.terms or {}).get(name, 0.0)
         does = f"adds {term:.2f} m to" if term >= 0.0 else f"takes {-term:.2f} m from"
         say = (
-            f"{name.capitalize()}, {count} points: {MEANING[name]}. This {does} the score. The thin lines are beams of"
-            " the other sensor."
+            f"{name.capitalize()}, {count} point{'' if count == 1 else 's'}: {MEANING[name]}. This {does} the score,"
+            " which is metres of wall that speak for the candidate less metres against it. The thin lines are beams."
         )
         line = ("2", "3", "4", "4")[kind]
         return Step(line, say, tuple(shapes), (*self._terms(), metres("part of the score", term)))
@@ -150,7 +153,7 @@ def refinement_stage(trace: Trace, match: Match, parameters: Parameters, box: Bo
         id="refinement",
         title="Refining and ranking",
         about="Equal angles lay map 2 only about right. Verified mode scores the candidates by lines of sight, keeps"
-        " the best of each heap of similar ones, moves each until the points fit, and scores again.",
+        " the best of several that are nearly the same, moves each until the points fit, and scores again.",
         algorithm="verified",
         count=2 * len(events) + len(match.ranked),
         step=held.step,
@@ -175,7 +178,7 @@ class _Refinement:
         poses, rows = event["poses"], event["rows"]
         say = (
             f"Each dot is where a candidate puts the sensor of scan 2. Of {len(poses)} candidates {len(rows)} are left"
-            " (marked): the best by lines of sight, one of each heap."
+            " (marked): the best by lines of sight, and of several that are nearly the same only one."
         )
         thinned = poses[:: max(1, len(poses) // 2000), :2]
         shapes = (of("first", "first"), points(thinned, "faint", size=3), points(poses[rows, :2], "accent", size=6))

@@ -51,8 +51,8 @@ def evaluation_stage(found: Found, mode: str, truth: Pose2 | None = None) -> Sta
     return Stage(
         id="evaluation",
         title="Value of the candidates",
-        about="The value of a candidate is the length of wall, in metres, on which the two maps agree when map 2 is"
-        f" moved as the candidate says. The candidate of the highest value wins.{more}",
+        about="The value of a candidate, a guess at how map 2 lies on map 1, is the length of wall, in metres, on which"
+        f" the two maps agree when map 2 is moved like that. The candidate of the highest value wins.{more}",
         algorithm="4",
         count=len(found) + 1,
         step=lambda k: _beginning(found) if k == 0 else _valued(found, k - 1, truth),
@@ -85,13 +85,14 @@ def _valued(found: Found, k: int, truth: Pose2 | None) -> Step:
     elif value > before:
         line = "21"
         say = (
-            f"Candidate {k + 1} of {len(found)} is worth {value:.2f} m, more than the best before it"
-            f" ({before:.2f} m): it is the best so far. The coloured segments match."
+            f"Candidate {k + 1} of {len(found)} has a value of {value:.2f} m, more than the best before it"
+            f" ({before:.2f} m): it is the best so far. On the coloured segments the two maps agree: they match."
         )
     else:
         line = "22"
         say = (
-            f"Candidate {k + 1} of {len(found)} is worth {value:.2f} m, not more than the best so far ({before:.2f} m)."
+            f"Candidate {k + 1} of {len(found)} has a value of {value:.2f} m, not more than the best so far"
+            f" ({before:.2f} m)."
             + (" The coloured segments match." if told.pairs else " No segment lies along another: nothing matches.")
         )
     numbers: tuple[Quantity, ...] = (
@@ -239,17 +240,21 @@ class _Pairs:
         pair = f"Segment {i} of map 1 and segment {j} of map 2"
         if tolerances > p.segment_distance_threshold:
             return "10", (
-                f"{pair} are {term.distance:.3f} m apart, {tolerances:.1f} tolerances; more than"
-                f" {p.segment_distance_threshold:g} cannot be the same wall: this adds 0."
+                f"{pair} are {term.distance:.3f} m apart, {tolerances:.1f} times the tolerance of"
+                f" {p.point_distance_tolerance:g} m. More than {p.segment_distance_threshold:g} times cannot be one"
+                " wall: this pair adds nothing to the value."
             )
         if max(term.common_1, term.common_2) <= 0.0:
-            return "14", f"{pair} lie beside no part of each other, so they have nothing in common: this adds 0."
+            return (
+                "14",
+                f"{pair} lie beside no part of each other: no length in common, and nothing to add to the value.",
+            )
         half = f"{term.common_1:.2f} m of the one and {term.common_2:.2f} m of the other"
         if term.factor == 1.0:
             return "18", f"{pair} touch and have {half} in common: the mean, {term.value:.3f} m, counts in full."
         return "16", (
             f"{pair} have {half} in common but are {term.distance:.3f} m apart: the mean is multiplied by"
-            f" {p.distance_penalty:g} to the power {tolerances:.2f}, which is {term.factor:.3f}."
+            f" {p.distance_penalty:g} once for each {p.point_distance_tolerance:g} m, in all by {term.factor:.3f}."
             f" They add {term.value:.3f} m."
         )
 
