@@ -30,8 +30,9 @@ CLOSING = ("closed", "joined")
 """what links are that bring something beyond the chain of each log"""
 ROUNDS = 6
 """times that is looked which links are missing"""
-FAR_OFF = 0.25
-"""metres; a link farther from where the whole map has it comes after all others, however sure it is"""
+FAR_OFF = 0.2
+"""metres; a closure farther from where the whole map has it says too little to be asked about, and ties only where no
+other link does"""
 TOGETHER = 4.0
 """metres of way; closures nearer to each other at both ends belong to one revisit"""
 SPACING = 8.0
@@ -59,7 +60,7 @@ class Proposed:
     ties: tuple[Link, ...]
     """links that hold scans which neighbours and the closures chosen leave apart, or let slide"""
     silenced: tuple[Link, ...]
-    """closures that the others contradict: not asked about"""
+    """closures that the others contradict, or put elsewhere than they say themselves: not asked about"""
 
     @property
     def chosen(self) -> tuple[Link, ...]:
@@ -88,8 +89,8 @@ def proposed(whole: WholeMap, beside: Matches) -> Proposed:
     ]
     ties = [*_ties(whole, [*firm, *chosen])]
     fates = zip(whole.links, whole.optimised.residuals, strict=True)
-    silenced = tuple(link for link, fate in fates if fate.silenced and link.why in CLOSING)
-    return Proposed(found, (*ties, *_pins(whole, [*firm, *chosen, *ties])), silenced)
+    off = (link for link, fate in fates if link.why in CLOSING and (fate.silenced or fate.translation > FAR_OFF))
+    return Proposed(found, (*ties, *_pins(whole, [*firm, *chosen, *ties])), tuple(off))
 
 
 def neighbours(scans: Iterable[ScanId]) -> Iterator[tuple[ScanId, ScanId]]:
@@ -116,9 +117,11 @@ def _held(whole: WholeMap) -> list[Link]:
 
 
 def revisits(whole: WholeMap) -> tuple[Revisit, ...]:
-    """The closures of a whole map that are not silenced, by revisit, the surest revisit first."""
+    """The closures of a whole map that it bears out, by revisit, the surest revisit first."""
     ways = _ways(whole)
-    links = [link for link in _held(whole) if link.why in CLOSING]
+    fates = {link.pair: fate for link, fate in zip(whole.links, whole.optimised.residuals, strict=True)}
+    held = (link for link in _held(whole) if link.why in CLOSING)
+    links = [link for link in held if fates[link.pair].translation <= FAR_OFF]
     places = np.array([(ways[link.first], ways[link.second]) for link in links]).reshape(-1, 2)
     parts = Parts(len(links))
     for a, b in sorted(cKDTree(places).query_pairs(TOGETHER, p=math.inf)) if links else ():

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 
+from segmap.graph.arrays import gaps
 from segmap.graph.least_squares import STEPS
+from segmap.graph.reattaching import reattached
 from segmap.graph.robust import FIRST_STEPS, Minimise, Problem, Round, reconsidered, settled
 from segmap.pose import FloatArray
 
@@ -14,6 +17,10 @@ __all__ = ["decided"]
 
 MANY = 0.05
 """of the edges that can be silenced; where more are, the poses that were given are taken for wrong"""
+DOUBTFUL, TRIED = 2.0, 20
+"""times the gate up to which silenced edges are tried, and how many of them"""
+LOOKS = 4
+"""times that is looked for edges too many metres off"""
 FINE = 5.0
 """standard deviations; where no edge is farther off, no better place is looked for"""
 
@@ -34,14 +41,52 @@ def decided(
     agreed = minimise(problem.starts[0], every, FIRST_STEPS)
     if (problem.edges.squares(agreed) <= problem.gate**2).all():
         problem.tell(Round(problem.loss(agreed), 0, agreed))
-        return minimise(agreed, every, STEPS), every
+        return _within(problem, minimise(agreed, every, STEPS), every, minimise)
     found = _both(problem, problem.starts[0], minimise, begin)
     bearable = MANY * len(problem.free) if problem.given else 0.0
     for start in problem.starts[1:]:
         if min(_silenced(weights) for _, weights in found) > bearable:
             found += _both(problem, start, minimise, begin)
-    poses, weights = min(found, key=lambda one: problem.loss(one[0]))
-    return minimise(poses, weights, STEPS), weights
+    poses, weights = min(found, key=lambda one: problem.cost(*one))
+    return _within(problem, *_heard(problem, minimise(poses, weights, STEPS), weights, minimise), minimise)
+
+
+def _heard(
+    problem: Problem, poses: FloatArray, weights: FloatArray, minimise: Minimise
+) -> tuple[FloatArray, FloatArray]:
+    """Poses and weights with those silenced edges that would be within the gate if they counted, as all others would.
+
+    Without them the loss may be less; but where nothing is wrong they count, and what is wrong elsewhere must
+    not change that.
+    """
+    squared = problem.edges.squares(poses)
+    near = np.flatnonzero((weights == 0.0) & (squared <= (DOUBTFUL * problem.gate) ** 2))
+    for edge in near[np.argsort(squared[near], kind="stable")][:TRIED]:
+        counting = weights.copy()
+        counting[edge] = 1.0
+        moved = minimise(poses, counting, STEPS)
+        counted = problem.free[counting[problem.free] > 0.0]
+        if (problem.edges.squares(moved)[counted] <= problem.gate**2).all():
+            poses, weights = moved, counting
+    return poses, weights
+
+
+def _within(
+    problem: Problem, poses: FloatArray, weights: FloatArray, minimise: Minimise
+) -> tuple[FloatArray, FloatArray]:
+    """Poses and weights without the edges that are too many metres off, but for those that alone hold something."""
+    if math.isinf(problem.most):
+        return poses, weights
+    for _ in range(LOOKS):
+        far = problem.free[gaps(poses, problem.edges)[problem.free] > problem.most]
+        far = far[weights[far] > 0.0]
+        kept = weights.copy()
+        kept[far] = 0.0
+        poses = reattached(problem.edges, poses, kept, problem.gate)
+        if (kept == weights).all():
+            break
+        poses, weights = minimise(poses, kept, STEPS), kept
+    return poses, weights
 
 
 def _both(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -71,6 +72,8 @@ class Optimised:
     """standard deviations beyond which an edge that is not trusted was silenced; infinite where none could be"""
     backend: str
     """``scipy`` or ``gtsam``"""
+    most: float = math.inf
+    """metres beyond which such an edge was silenced, however little it claims to know"""
 
     @property
     def error(self) -> float:

@@ -66,17 +66,18 @@ def preview(
     before: Optimised | None = None,
     *,
     gate: float = GATE,
+    most: float = math.inf,
     check: Callable[[], None] | None = None,
 ) -> Preview:
     """What would come of accepting ``candidate`` beside the accepted ``edges``.
 
     ``before`` is the present graph, the result of :func:`optimise` on ``edges``; without it, it is computed.
     """
-    before = before or optimise(edges, gate=gate, check=check)
+    before = before or optimise(edges, gate=gate, most=most, check=check)
     believed = replace(candidate, trusted=True)
     initial = before.poses if _together(candidate, before) else None
-    after = optimise([*edges, believed], initial, gate=gate, check=check)
-    judged = optimise([*edges, replace(candidate, trusted=False)], initial, gate=gate, check=check)
+    after = optimise([*edges, believed], initial, gate=gate, most=most, check=check)
+    judged = optimise([*edges, replace(candidate, trusted=False)], initial, gate=gate, most=most, check=check)
     expected = _expected(candidate, before, judged.residuals[-1].weight)
     now_silent = zip(before.residuals, after.residuals[:-1], strict=True)
     contradicts = [new for old, new in now_silent if new.silenced and not old.silenced]

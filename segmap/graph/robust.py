@@ -64,10 +64,14 @@ class Problem:
     """poses (n, 3) to begin from: those that were given, along the surest edges, along the edges nearest in the logs"""
     given: bool
     """whether the first were"""
+    reliance: FloatArray
+    """(m,), 0..1; how much less likely an edge is wrong than others: the nearer its scans in their log, the more"""
     free: IntArray
     """the edges that can be silenced"""
     gate: float
     """standard deviations"""
+    most: float
+    """metres; an edge that can be silenced and is farther off says nothing"""
     tell: Callable[[Round], None]
     """is told of every round"""
 
@@ -76,6 +80,12 @@ class Problem:
         squared = self.edges.squares(poses)
         squared[self.free] = np.minimum(squared[self.free], self.gate**2)
         return float(squared.sum())
+
+    def cost(self, poses: FloatArray, weights: FloatArray) -> float:
+        """The loss, and what it takes to take reliable edges for wrong: of two that contradict each other, the
+        one that joins scans near each other in their log is right.
+        """
+        return self.loss(poses) + self.gate**2 * float(self.reliance[weights == 0.0].sum())
 
 
 def graduated(problem: Problem, poses: FloatArray, minimise: Minimise) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from segmap.graph.edges import Edge, Parts
 from segmap.pose import FloatArray, Pose2
 from segmap.scans import ScanId
 
-__all__ = ["along_logs", "first_poses", "uncertainty"]
+__all__ = ["along_logs", "composed_along", "first_poses", "steps_between", "tree", "uncertainty"]
 
 ARM = 5.0
 """metres; how far from a scan an error of its heading is felt"""
@@ -29,8 +29,12 @@ def along_logs(edge: Edge) -> tuple[float, float]:
 
     Between logs, and among edges as far apart, the surest can be relied on most.
     """
-    steps = abs(edge.second.scan - edge.first.scan) if edge.first.log == edge.second.log else math.inf
-    return steps, uncertainty(edge)
+    return steps_between(edge), uncertainty(edge)
+
+
+def steps_between(edge: Edge) -> float:
+    """How many scans apart in their log the scans of an edge were taken; infinite for scans of different logs."""
+    return abs(edge.second.scan - edge.first.scan) if edge.first.log == edge.second.log else math.inf
 
 
 def first_poses(
@@ -44,10 +48,17 @@ def first_poses(
     ``initial`` poses are taken; what lacks one is composed along a spanning tree: trusted edges first, then
     those of the least ``doubt``, as a rule the surest.
     """
+    return composed_along(scans, tree(scans, edges, initial or {}, doubt), initial)
+
+
+def composed_along(
+    scans: Sequence[ScanId], edges: Iterable[Edge], initial: Mapping[ScanId, Pose2] | None = None
+) -> FloatArray:
+    """Poses (n, 3) of the scans of one component in the frame of the first, along the edges of a tree."""
     initial = initial or {}
     places = {scan: place for place, scan in enumerate(scans)}
     links: list[list[tuple[int, Pose2]]] = [[] for _ in scans]
-    for edge in _tree(edges, places, initial, doubt):
+    for edge in edges:
         a, b = places[edge.first], places[edge.second]
         links[a].append((b, edge.T_1_2))
         links[b].append((a, edge.T_1_2.inverse()))
@@ -56,13 +67,11 @@ def first_poses(
     return _in_first_frame(np.array([tuple(poses[place]) for place in range(len(scans))]))
 
 
-def _tree(
-    edges: Sequence[Edge],
-    places: Mapping[ScanId, int],
-    initial: Mapping[ScanId, Pose2],
-    doubt: Callable[[Edge], Any],
+def tree(
+    scans: Sequence[ScanId], edges: Sequence[Edge], initial: Mapping[ScanId, Pose2], doubt: Callable[[Edge], Any]
 ) -> list[Edge]:
-    """Edges that reach every scan from those with initial poses, without a loop."""
+    """Edges that reach every scan from those with initial poses, without a loop; those of the least doubt."""
+    places = {scan: place for place, scan in enumerate(scans)}
     parts = Parts(len(places))
     held = [places[scan] for scan in initial if scan in places]
     for place in held[1:]:

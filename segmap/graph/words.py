@@ -26,16 +26,17 @@ def explain(result: Optimised, residual: Residual, ways: Ways | None = None) -> 
     """
     edge = residual.edge
     loop = loop_of(edge, ways or result.ways())
-    return (_verdict(residual, result.gate), *_loop(edge, loop))
+    return (_verdict(residual, result), *_loop(edge, loop))
 
 
-def _verdict(residual: Residual, gate: float) -> str:
+def _verdict(residual: Residual, result: Optimised) -> str:
+    gate = result.gate
     said = _BY[residual.edge.source].format(name=residual.edge.name)
     off = f"{in_words(residual.translation, residual.rotation)}, {residual.chi:.1f} standard deviations"
     if residual.silenced:
         return (
             f"{said}, the optimiser silences it: it puts scan {residual.edge.second} {off} from where the other"
-            f" edges have it; more than {gate:g} are not believed."
+            f" edges have it; {_limit(residual, result)}."
         )
     if residual.chi > gate:
         why = "it is trusted" if residual.edge.trusted else "nothing else holds what it joins"
@@ -43,6 +44,12 @@ def _verdict(residual: Residual, gate: float) -> str:
             f"{said}, and the graph keeps it because {why}; it is {off} off, more than the {gate:g} believed of others."
         )
     return f"{said}, and the graph agrees: it is {off} off."
+
+
+def _limit(residual: Residual, result: Optimised) -> str:
+    if residual.chi <= result.gate and residual.translation > result.most:
+        return f"more than {result.most:g} m are not believed, however little it claims to know"
+    return f"more than {result.gate:g} are not believed"
 
 
 def _loop(edge: Edge, loop: Loop | None) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from segmap.errors import CancelledError, GraphError
-from segmap.graph import GATE, Edge, components, optimise
+from segmap.graph import GATE, Edge, components, explain, optimise
 from segmap.pose import Pose2
 from segmap.scans import ScanId
 
@@ -90,6 +90,61 @@ def test_who_claims_to_be_surer_than_all_others_is_not_believed_for_that(seed):
     clean, result = optimise(kept), optimise([*kept, *wrong])
     assert silenced(result) == [False] * len(kept) + [True, True]
     assert same(result.poses, clean.poses)
+
+
+def test_of_two_that_contradict_each_other_the_nearer_in_the_log_is_right():
+    """A scan that hangs on one neighbour stays there, whatever a surer claim from far away says."""
+    _, edges = ring(20)
+    hanging = Edge(ScanId(0, 19), ScanId(0, 21), Pose2(0.7, 0.1, 0.0), COVARIANCE)
+    sure = tuple(tuple(0.01 * number for number in row) for row in COVARIANCE)
+    wrong = Edge(ScanId(0, 2), ScanId(0, 21), Pose2(30.0, 0.0, 0.0), sure)
+    result = optimise([*edges, hanging, wrong])
+    assert silenced(result) == [False] * (len(edges) + 1) + [True]
+    assert (result.poses[ScanId(0, 19)].inverse() @ result.poses[ScanId(0, 21)]).distance(hanging.T_1_2)[0] < 1e-6
+
+
+def test_where_a_log_is_in_two_pieces_most_edges_between_them_decide():
+    """Also where one that is wrong joins scans nearer to each other in the log than those that are right."""
+    _, edges = ring(60, trusted=False)
+    gap = 30
+    kept = [e for e in edges if not (e.first.scan < gap <= e.second.scan and e.second.scan - e.first.scan < 28)]
+    across = [e for e in kept if e.first.scan < gap <= e.second.scan]
+    others = [e for e in kept if e not in across]
+    wrong = [Edge(ScanId(0, 25), ScanId(0, gap + i), Pose2(20.0 - i, 9.0, 1.0), COVARIANCE) for i in (1, 9)]
+    clean, result = optimise([*others, *across[:6]]), optimise([*others, *across[:6], *wrong])
+    assert silenced(result) == [False] * (len(others) + 6) + [True, True]
+    assert same(result.poses, clean.poses)
+
+
+def test_what_is_metres_off_says_nothing_however_little_it_claims_to_know():
+    """A match that slid two metres along a corridor is within its own deviations; it is silenced, and moves nothing."""
+    truth, edges = ring(40, trusted=False)
+    loose = ((4.0, 0.0, 0.0), (0.0, 4e-4, 0.0), (0.0, 0.0, 1e-4))
+    T = truth[ScanId(0, 4)].inverse() @ truth[ScanId(0, 23)]
+    slid = Edge(ScanId(0, 4), ScanId(0, 23), Pose2(T.x + 2.0, T.y, T.theta), loose)
+    believed, doubted = optimise([*edges, slid]), optimise([*edges, slid], most=0.4)
+    assert believed.silenced == ()
+    assert silenced(doubted) == [False] * len(edges) + [True]
+    assert far_apart(doubted.poses, optimise(edges).poses) == pytest.approx((0.0, 0.0), abs=1e-9)
+    assert (
+        "more than 0.4 m are not believed, however little it claims to know" in explain(doubted, doubted.silenced[0])[0]
+    )
+    alone = Edge(ScanId(0, 4), ScanId(0, 99), Pose2(2.0, 0.0, 0.0), loose)
+    assert optimise([*edges, alone], most=0.4).silenced == ()
+
+
+def test_what_is_wrong_elsewhere_does_not_silence_what_would_count():
+    """An edge just within the gate counts with wrong edges in the graph as it does without."""
+    truth, edges = ring(40, noise=0.0, trusted=False)
+    T = truth[ScanId(0, 5)].inverse() @ truth[ScanId(0, 25)]
+    for off in (5.0, 5.2, 5.4, 5.6):
+        odd = Edge(
+            ScanId(0, 5), ScanId(0, 25), Pose2(T.x + off * math.sqrt(COVARIANCE[0][0]), T.y, T.theta), COVARIANCE
+        )
+        clean = optimise([*edges, odd])
+        mixed = optimise([*with_wrong([*edges, odd], 0.1, "random")])
+        assert mixed.residuals[len(edges)].silenced == clean.residuals[len(edges)].silenced
+        assert same(mixed.poses, clean.poses)
 
 
 def test_without_the_robust_kernel_everything_counts():
