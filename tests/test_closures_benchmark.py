@@ -1,4 +1,4 @@
-"""benchmarks/closures.py: what it measures with, on a sample log."""
+"""benchmarks/closures.py and many_scans.py: what they measure with, on a sample log."""
 
 import importlib
 import json
@@ -24,24 +24,30 @@ def script():
         yield importlib.import_module("closures")
 
 
-def test_parts_of_a_log(script):
+@pytest.fixture(scope="module")
+def many(script):
+    """The other one."""
+    return importlib.import_module("many_scans")
+
+
+def test_parts_of_a_log(many):
     """Four that overlap, or that take turns where they do; nothing is left out."""
-    sharing, turns = script._sharing(910), script._taking_turns(910)
+    sharing, turns = many._sharing(910), many._taking_turns(910)
     assert [len(part) for part in sharing] == [248, 268, 268, 246]
     assert set().union(*sharing) == set(range(910))
     assert sorted(i for part in turns for i in part) == list(range(910))
     shared = set(sharing[1]) & set(sharing[2])
-    assert len(shared) == script.OVERLAP
+    assert len(shared) == many.OVERLAP
     assert {i % 2 for i in shared & set(turns[1])} != {i % 2 for i in shared & set(turns[2])}
 
 
-def test_poses_are_laid_on_others_at_best(script):
+def test_poses_are_laid_on_others_at_best(many):
     """A trajectory moved and turned as a whole is not off; one scan that is moved is."""
     true = [Pose2(i * 0.5, (i % 7) * 0.3, i * 0.1) for i in range(30)]
     found = [Pose2(4.0, -2.0, 2.5) @ pose for pose in true]
-    assert script._aligned(found, true) == pytest.approx(np.zeros((30, 2)), abs=1e-6)
+    assert many._aligned(found, true) == pytest.approx(np.zeros((30, 2)), abs=1e-6)
     found[10] = found[10] @ Pose2(1.0, 0.0, 0.0)
-    assert script._aligned(found, true)[10, 0] == pytest.approx(1.0, abs=0.1)
+    assert many._aligned(found, true)[10, 0] == pytest.approx(1.0, abs=0.1)
 
 
 def test_pairs_beside_each_other_are_one_revisit(script):
