@@ -28,6 +28,8 @@ __all__ = ["PARAMETER", "VARIABLE", "Access", "is_loopback", "token_for"]
 VARIABLE = "SEGMAP_TOKEN"
 """the environment variable that gives a token of one's own, the same after every start"""
 PARAMETER = "token"
+OPEN = ("/follow/", "/static/")
+"""where nothing is asked: who follows a view is known by the name in the address, and may only look; our own scripts"""
 SHORTEST = 16
 DAYS = 30
 MISSING = "This server asks for the link that it printed when it was started: open that link, or ask who started it."
@@ -69,7 +71,7 @@ class Access:
 
     def refusal(self, scope: Scope, headers: Headers) -> Response | None:
         """What to answer instead of the request: a redirection for who brings the link, 401 for who brings nothing."""
-        if self._token is None or self._admitted(headers):
+        if self._token is None or self._admitted(headers) or scope["path"].startswith(OPEN):
             return None
         if scope["type"] == "http" and scope["method"] in ("GET", "HEAD") and self._is_token(_in_link(scope)):
             return self._welcome(scope, headers)

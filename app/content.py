@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from app.drawables import Box, Pick, box
+from app.drawables import Box, Pick, around, box
 from app.map_looks import MapContent
 from app.palette import PALETTES, Palette
 from app.sights import Sights
@@ -25,6 +25,8 @@ __all__ = ["Content", "Pair", "Placed", "Tie", "alongside", "merit", "place"]
 
 GAP = 1.0
 """metres between things that have no relation to each other"""
+PLACES = 256
+"""components at places that are remembered"""
 
 
 def merit(candidate: Candidate) -> float:
@@ -110,11 +112,24 @@ class Placed:
     @cached_property
     def map(self) -> SegmentMap:
         """Its segments, where they are drawn."""
+        if self.T_map_component == Pose2.identity():
+            return self.component.map
         return self.component.map.moved(self.T_map_component)
+
+    @cached_property
+    def box(self) -> Box | None:
+        """The box around it, where it is drawn; None where it has no segments."""
+        return self.map.bounds
 
     def pose(self, scan: ScanId) -> Pose2:
         """Where a scan of it is drawn."""
         return self.T_map_component @ self.component.poses[scan]
+
+
+@lru_cache(PLACES)
+def _at(component: Component, T_map_component: Pose2) -> Placed:
+    """The same object for the same place, so that what a large map takes is done once."""
+    return Placed(component, T_map_component)
 
 
 def place(components: Iterable[Component], scans: Iterable[ScanId] = ()) -> tuple[Placed, ...]:
@@ -127,10 +142,10 @@ def place(components: Iterable[Component], scans: Iterable[ScanId] = ()) -> tupl
     placed: list[Placed] = []
     right = 0.0
     for component in grown:
-        left, bottom, to, _ = component.map.bounds or (0.0, 0.0, 0.0, 0.0)
+        left, bottom, to, _ = _at(component, Pose2.identity()).box or (0.0, 0.0, 0.0, 0.0)
         shift = Pose2(right - left + GAP, -bottom, 0.0) if placed else Pose2.identity()
         right = shift.x + to
-        placed.append(Placed(component, shift))
+        placed.append(_at(component, shift))
     return tuple(placed)
 
 
@@ -140,7 +155,7 @@ def alongside(placed: Sequence[Placed], others: Iterable[Component], *, over: bo
     Each is laid on the component with which it shares its first scan that both hold, and, unless ``over``, moved
     beyond the whole map, along its shorter side; those that share none stand in a row to the right.
     """
-    left, bottom, right, top = box(*(one.map.coordinates for one in placed)) or (0.0, 0.0, 0.0, 0.0)
+    left, bottom, right, top = around(one.box for one in placed) or (0.0, 0.0, 0.0, 0.0)
     width, height = right - left + 2.0 * GAP, top - bottom + 2.0 * GAP
     across = Pose2(0.0, -height, 0.0) if width > height else Pose2(width, 0.0, 0.0)
     shift = Pose2.identity() if over else across
@@ -151,12 +166,12 @@ def alongside(placed: Sequence[Placed], others: Iterable[Component], *, over: bo
             continue
         home = next(((p, s) for s in component.scans for p in placed if s in p.component.poses), None)
         if home is None:
-            x, y, to, _ = component.map.bounds or (0.0, 0.0, 0.0, 0.0)
-            found.append(Placed(component, Pose2(right - x + GAP, shift.y - y, 0.0)))
+            x, y, to, _ = _at(component, Pose2.identity()).box or (0.0, 0.0, 0.0, 0.0)
+            found.append(_at(component, Pose2(right - x + GAP, shift.y - y, 0.0)))
             right += to - x + GAP
         else:
             part, scan = home
-            found.append(Placed(component, shift @ part.pose(scan) @ component.poses[scan].inverse()))
+            found.append(_at(component, shift @ part.pose(scan) @ component.poses[scan].inverse()))
     return tuple(found)
 
 
@@ -248,7 +263,7 @@ class Content:
     def bounds(self) -> Box | None:
         """The box around what matters, metres; None where there is nothing."""
         if self.stage == "map":
-            return box(*(p.map.coordinates for p in self.shown_parts), *(p.map.coordinates for p in self.beside))
+            return around(p.box for p in (*self.shown_parts, *self.beside))
         if self.pair is None:
             return None
         first, second = (

@@ -12,7 +12,35 @@ from numpy.typing import ArrayLike, NDArray
 from app.palette import RGB
 from segmap.pose import FloatArray, IntArray
 
-__all__ = ["Array32", "Box", "Drawable", "Frame", "Pick", "box", "dashes", "label", "lift", "lines", "points", "star"]
+__all__ = [
+    "Array32",
+    "Box",
+    "Drawable",
+    "Frame",
+    "Pick",
+    "around",
+    "box",
+    "dashes",
+    "label",
+    "lift",
+    "lines",
+    "points",
+    "star",
+]
+    "Array32",
+    "Box",
+    "Drawable",
+    "Frame",
+    "Pick",
+    "around",
+    "box",
+    "dashes",
+    "label",
+    "lift",
+    "lines",
+    "points",
+    "star",
+]
 
 Frame: TypeAlias = Literal["first", "second", "map"]
 """``first``: map 1, where the scene's origin is; ``second``: moves with the candidate; ``map``: the merged map"""
@@ -145,3 +173,12 @@ def box(*parts: FloatArray) -> Box | None:
     together = np.concatenate(held)
     (x1, y1), (x2, y2) = together.min(axis=0), together.max(axis=0)
     return float(x1), float(y1), float(x2), float(y2)
+
+
+def around(boxes: Iterable[Box | None]) -> Box | None:
+    """The box around some boxes; None where there are none."""
+    held = [one for one in boxes if one is not None]
+    if not held:
+        return None
+    left, bottom, right, top = zip(*held, strict=True)
+    return min(left), min(bottom), max(right), max(top)

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, StringConstraints
 
 from app.bodies import Body, Name
 
-__all__ = ["Copying", "DeletedList", "DeletedProject", "LogsAdded", "NewProject", "OtherMap", "OtherMaps", "Renaming"]
+__all__ = [
+    "Copying",
+    "DeletedList",
+    "DeletedProject",
+    "Followed",
+    "LogsAdded",
+    "NewProject",
+    "OtherMap",
+    "OtherMaps",
+    "Renaming",
+    "Shared",
+]
 
 Title = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
 
@@ -60,6 +71,24 @@ class OtherMaps(BaseModel):
     """What the merged map can be compared with."""
 
     options: list[OtherMap]
+
+
+class Shared(BaseModel):
+    """The addresses of a shared view."""
+
+    steer: str
+    """who has it sees the same and may change it"""
+    follow: str
+    """who has it sees the same"""
+
+
+class Followed(BaseModel):
+    """A view that is followed."""
+
+    project: str
+    """its name"""
+    scene: str
+    snapshot: dict[str, Any]
 
 
 class LogsAdded(BaseModel):

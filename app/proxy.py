@@ -3,6 +3,7 @@
     GET  /views/{view}/scene/     viser's page, with our policy and our script
     GET  /views/{view}/scene/...  whatever else it asks for
     WS   /views/{view}/scene      its socket: the page drops the last slash
+    /follow/{token}/scene...      the same of the scene that only shows what the view shows
 
 viser itself knows no origins: what a foreign page must not do is stopped here.
 """
@@ -17,6 +18,8 @@ from urllib.parse import quote
 
 import httpx
 from fastapi import APIRouter, Request, Response, WebSocket
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocketDisconnect, WebSocketState
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
@@ -84,10 +87,20 @@ SCRIPT = b"""<script>
 """
 """put into viser's page; uses its own test hook, so viser's version is pinned"""
 
-router = APIRouter(prefix="/views/{view}/scene", include_in_schema=False)
+router = APIRouter(include_in_schema=False)
+STEER, FOLLOW = "/views/{view}/scene", "/follow/{view}/scene"
+"""of who may steer the view, and of who may only look; each is known by a name of its own"""
 
 
-@router.get("/")
+def _scene_of(site: Site, request: HTTPConnection, view: str) -> Scene:
+    """The scene that belongs to an address. Raises UnknownError where there is none (any more)."""
+    if request.url.path.startswith("/follow/"):
+        return site.views.audience_of(view)
+    return site.views.get(view).scene
+
+
+@router.get(STEER + "/")
+@router.get(FOLLOW + "/")
 async def page(site: Site, view: str, request: Request) -> Response:
     """viser's page.
 
@@ -99,27 +112,29 @@ async def page(site: Site, view: str, request: Request) -> Response:
         raise RequestError(
             f"The scene takes no {foreign[0][:40]!r} in its address; it takes {', '.join(sorted(QUERY))}."
         )
-    answer = await _fetch(site.views.get(view).scene.port, "/")
+    answer = await _fetch((await run_in_threadpool(_scene_of, site, request, view)).port, "/")
     return Response(_with_script(answer.content), media_type="text/html", headers={"Content-Security-Policy": POLICY})
 
 
-@router.get("/{path:path}")
-async def asset(site: Site, view: str, path: str) -> Response:
+@router.get(STEER + "/{path:path}")
+@router.get(FOLLOW + "/{path:path}")
+async def asset(site: Site, view: str, path: str, request: Request) -> Response:
     """Anything else of viser's page."""
-    answer = await _fetch(site.views.get(view).scene.port, "/" + quote(path))
+    answer = await _fetch(_scene_of(site, request, view).port, "/" + quote(path))
     kind = answer.headers.get("content-type")
     return Response(answer.content, answer.status_code, media_type=kind, headers={"Content-Security-Policy": POLICY})
 
 
-@router.websocket("")
+@router.websocket(STEER)
+@router.websocket(FOLLOW)
 async def socket(site: Site, view: str, browser: WebSocket) -> None:
     """viser's socket, for pages of our own origin; the view stays open as long as it is."""
     if not own_origin(browser.headers):
         await browser.close(1008)
         return
     try:
-        with site.views.watched(view) as opened:
-            await _bridge(browser, opened.scene)
+        with site.views.watched(view):
+            await _bridge(browser, _scene_of(site, browser, view))
     except UnknownError:
         await browser.close(1008)
 

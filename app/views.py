@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from app.session import Session
     from app.workbench import View
 
-__all__ = ["OpenView", "Views", "open_scene"]
+__all__ = ["OpenView", "Views", "open_audience", "open_scene"]
 
 LIMIT = 24
 IDLE_SECONDS = 60.0
@@ -33,6 +33,10 @@ class OpenView:
     scene: Scene
     touched: float
     pages: int = field(default=0)
+    follow: str = ""
+    """what the view is known by to those who may only look; empty: nobody may"""
+    audience: Scene | None = None
+    """the scene that shows them what the view shows"""
 
 
 def open_scene(session: Session) -> tuple[View, Scene]:
@@ -44,6 +48,15 @@ def open_scene(session: Session) -> tuple[View, Scene]:
     return view, Scene(view)
 
 
+def open_audience(opened: OpenView) -> Scene:
+    """A second scene of a view that takes no orders, and looks where the first one looks."""
+    from app.scene import Scene
+
+    audience = Scene(opened.view, audience=True)
+    opened.scene.lead(audience)
+    return audience
+
+
 class Views:
     """All open views by id. Ids are not guessable: who knows one may steer the view."""
 
@@ -51,12 +64,14 @@ class Views:
         self,
         make: Callable[[Session], tuple[View, Scene]] = open_scene,
         *,
+        make_audience: Callable[[OpenView], Scene] = open_audience,
         limit: int = LIMIT,
         idle_seconds: float = IDLE_SECONDS,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._make, self._limit, self._idle_seconds, self._clock = make, limit, idle_seconds, clock
-        self._lock = threading.Lock()
+        self._make_audience = make_audience
+        self._lock, self._opening_audience = threading.Lock(), threading.Lock()
         self._views: dict[str, OpenView] = {}
         self._opening = 0
 
@@ -93,10 +108,38 @@ class Views:
             found.touched = self._clock()
             return found
 
+    def share(self, id: str) -> OpenView:
+        """Let others follow a view: it has a name for them from now on. Raises UnknownError where there is none."""
+        found = self.get(id)
+        with self._lock:
+            found.follow = found.follow or secrets.token_urlsafe(16)
+        return found
+
+    def followed(self, token: str) -> OpenView:
+        """The view that is followed by this name.
+
+        Raises:
+            UnknownError: there is none (any more).
+        """
+        with self._lock:
+            found = next((one for one in self._views.values() if one.follow and one.follow == token), None)
+            if found is None:
+                raise UnknownError("The view you follow has ended: ask for a new link.")
+            found.touched = self._clock()
+            return found
+
+    def audience_of(self, token: str) -> Scene:
+        """The scene of those who follow a view; made when the first of them comes. Raises UnknownError."""
+        found = self.followed(token)
+        with self._opening_audience:
+            if found.audience is None:
+                found.audience = self._make_audience(found)
+            return found.audience
+
     @contextmanager
     def watched(self, id: str) -> Iterator[OpenView]:
-        """Keep a view open while a page listens to it."""
-        found = self.get(id)
+        """Keep a view open while a page listens to it; ``id`` may be the name it is followed by."""
+        found = self.get(id) if id in self._views else self.followed(id)
         with self._lock:
             found.pages += 1
         try:
@@ -150,7 +193,9 @@ class Views:
 
 
 def _close(opened: OpenView) -> None:
-    """The scene first: it listens to the view."""
+    """The scenes first: they listen to the view."""
+    if opened.audience is not None:
+        opened.audience.close()
     opened.scene.close()
     close = getattr(opened.view, "close", None)
     if close is not None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import shutil
 import subprocess
 import sys
@@ -120,6 +121,15 @@ class Served:
             time.sleep(0.2)
         return sum(part["segments"] for part in info["components"])
 
+    @property
+    def processor_ms(self) -> float:
+        """Milliseconds of processor time the server has used; NaN where the system does not tell."""
+        told = Path(f"/proc/{self._process.pid}/stat")
+        if not told.exists():
+            return math.nan
+        user, system = told.read_text().rpartition(")")[2].split()[11:13]
+        return 1000.0 * (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
     def close(self) -> None:
         """End the server."""
         self.client.close()
@@ -195,11 +205,14 @@ def measure(served: Served, project: str, rounds: int, chromium: str) -> None:
                     told.setdefault(name, []).append(timed(request))
 
         still = frames_while(page, None)
+        before = served.processor_ms
         working = frames_while(page, ask)
+        spent = (served.processor_ms - before) / sum(map(len, told.values()))
         rows = [summary(name, times) for name, times in told.items()]
         rows.append(summary("all", [one for times in told.values() for one in times]))
         print(markdown(["request, ms", "median", "95 %", "times"], rows))
         print(f"{still:.1f} frames a second while the map is moved, {working:.1f} while requests come in as well;")
+        print(f"{spent:.0f} ms of the server's processor time a request, what it sends to the scene included;")
         print(f"renderer: {scene.evaluate(RENDERER)}")
         browser.close()
 

@@ -13,7 +13,7 @@ from app.routes.common import Opened, Site
 from app.streams import Event, Subscribe
 from app.views import OpenView
 
-__all__ = ["router"]
+__all__ = ["of_view", "router"]
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["events"])
 
@@ -24,7 +24,7 @@ def events(site: Site, session: Opened, view: Annotated[str | None, Query(max_le
     sources: list[Subscribe] = [session.subscribe]
     holding: list[AbstractContextManager[Any]] = []
     if view is not None:
-        sources.append(_events_of(site.views.get(view)))
+        sources.append(of_view(site.views.get(view)))
         holding.append(site.views.watched(view))
     first = {"type": "hello", "revision": session.state.revision}
     return StreamingResponse(
@@ -34,7 +34,7 @@ def events(site: Site, session: Opened, view: Annotated[str | None, Query(max_le
     )
 
 
-def _events_of(opened: OpenView) -> Subscribe:
+def of_view(opened: OpenView) -> Subscribe:
     """The events of a view, each with the view's id."""
 
     def subscribe(callback: Callable[[Event], None]) -> Callable[[], None]:

@@ -20,7 +20,7 @@ from app.palette import PALETTES
 from app.scene.camera import Cameras, reach
 from app.scene.gizmo import Gizmo
 from app.scene.nodes import Nodes
-from app.scene.panel import Panel
+from app.scene.panel import Onlookers, Panel
 from app.scene.server import PASS_HEADER, QuietServer
 from app.workbench import View
 from segmap.errors import SegmapError
@@ -32,9 +32,12 @@ log = logging.getLogger(__name__)
 
 
 class Scene:
-    """The scene of a view, on a loopback port; close it before the view."""
+    """The scene of a view, on a loopback port; close it before the view.
 
-    def __init__(self, view: View) -> None:
+    That of an ``audience`` shows what the view shows, and nobody who looks at it can change anything.
+    """
+
+    def __init__(self, view: View, *, audience: bool = False) -> None:
         self._view = view
         self._server = QuietServer()
         self._theme = ""
@@ -43,10 +46,11 @@ class Scene:
         self._stale, self._closed = threading.Event(), False
         self._nodes = Nodes(self._server.scene)
         self._cameras = Cameras(self._server)
-        self._panel = Panel(self._server.gui, view, self._do)
-        self._gizmo = Gizmo(self._server.scene, view, self._do)
+        self._panel = Onlookers(self._server.gui) if audience else Panel(self._server.gui, view, self._do)
+        self._gizmo = None if audience else Gizmo(self._server.scene, view, self._do)
         self._draw()
-        self._server.scene.on_click()(self._clicked)
+        if not audience:
+            self._server.scene.on_click()(self._clicked)
         self._server.on_client_connect(self._cameras.welcome)
         self._server.on_client_disconnect(self._cameras.forget)
         self._unsubscribe = view.subscribe(lambda _: self._stale.set())
@@ -63,6 +67,10 @@ class Scene:
         """What a socket must bring to be let in."""
         return {PASS_HEADER: self._server.secret}
 
+    def lead(self, audience: Scene) -> None:
+        """Let another scene look where this one looks, from now on."""
+        self._cameras.lead(audience._cameras)
+
     def close(self) -> None:
         """Stop serving; closing twice is harmless."""
         if not self._closed:
@@ -70,7 +78,8 @@ class Scene:
             self._unsubscribe()
             self._stale.set()
             self._thread.join(CLOSE_SECONDS)
-            self._gizmo.close(CLOSE_SECONDS)
+            if self._gizmo is not None:
+                self._gizmo.close(CLOSE_SECONDS)
             self._server.stop()
 
     # --- drawing ----------------------------------------------------------------------------------
@@ -93,7 +102,8 @@ class Scene:
             self._dress(picture.theme)
             self._nodes.show(picture)
             self._panel.show(snapshot)
-            self._gizmo.show(picture, snapshot["nudging"])
+            if self._gizmo is not None:
+                self._gizmo.show(picture, snapshot["nudging"])
         self._cameras.follow(picture, fits)
 
     def _move(self, before: Content, after: Content) -> None:

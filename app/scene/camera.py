@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import threading
+from dataclasses import dataclass
 from itertools import product
 from typing import TypeAlias
 
@@ -36,6 +37,29 @@ BACK_3D = np.array([-0.45, -0.75, 0.75]) / np.linalg.norm([-0.45, -0.75, 0.75])
 PICK_PIXELS = 10.0
 
 
+@dataclass(frozen=True)
+class _Stand:
+    """Where a camera stands."""
+
+    fov: float
+    near: float
+    far: float
+    up: Triple
+    position: Triple
+    look_at: Triple
+
+    @classmethod
+    def of(cls, camera: viser.CameraHandle) -> _Stand:
+        distance = float(np.linalg.norm(np.subtract(camera.position, camera.look_at)))
+        places = (_triple(np.asarray(one)) for one in (camera.up_direction, camera.position, camera.look_at))
+        return cls(camera.fov, *near_far(distance), *places)
+
+    def take(self, camera: viser.CameraHandle) -> None:
+        """Put a camera there."""
+        camera.fov, camera.near, camera.far = self.fov, self.near, self.far
+        camera.up_direction, camera.position, camera.look_at = self.up, self.position, self.look_at
+
+
 class Cameras:
     """Fits the cameras of all browsers to what is shown, and again when their windows change."""
 
@@ -45,6 +69,8 @@ class Cameras:
         self._picture: Picture | None = None
         self._fits = -1
         self._put: dict[int, tuple[float, Triple]] = {}
+        self._followers: list[Cameras] = []
+        self._led: _Stand | None = None
 
     def follow(self, picture: Picture, fits: int) -> None:
         """Fit all cameras if something else is looked at, from another side, or if somebody asked for it."""
@@ -69,7 +95,34 @@ class Cameras:
     def welcome(self, client: viser.ClientHandle) -> None:
         """Fit a browser that has just connected, and look out for changes of its window."""
         self.fit(client)
-        client.camera.on_update(lambda camera: self._keep_fitted(camera.client))
+        self._imitate(client)
+        client.camera.on_update(lambda camera: self._moved(camera.client))
+
+    def lead(self, followers: Cameras) -> None:
+        """Let the cameras of another scene look where those of this one look; the last one moved is followed."""
+        self._followers.append(followers)
+        for client in self._server.get_clients().values():
+            followers.look(_Stand.of(client.camera))
+
+    def look(self, stand: _Stand) -> None:
+        """Put all cameras where somebody else's stands."""
+        self._led = stand
+        for client in self._server.get_clients().values():
+            self._imitate(client)
+
+    def _imitate(self, client: viser.ClientHandle) -> None:
+        if self._led is not None:
+            with client.atomic():
+                self._led.take(client.camera)
+
+    def _moved(self, client: viser.ClientHandle) -> None:
+        """A camera was moved, or its window changed."""
+        if self._led is None:
+            self._keep_fitted(client)
+        stand = _Stand.of(client.camera) if self._followers else None
+        for follower in self._followers:
+            if stand is not None:
+                follower.look(stand)
 
     def forget(self, client: viser.ClientHandle) -> None:
         """A browser has gone."""

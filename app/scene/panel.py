@@ -12,7 +12,7 @@ from app.drawing import STAGES
 from app.scene import markup
 from app.workbench import View
 
-__all__ = ["HOTKEYS", "Panel"]
+__all__ = ["HOTKEYS", "Onlookers", "Panel"]
 
 Do = Callable[[Callable[[], None]], None]
 """runs an action of the view, and tells people what goes wrong"""
@@ -128,13 +128,13 @@ class Panel:
 
     def show(self, snapshot: Mapping[str, Any]) -> None:
         """Bring everything up to a snapshot; what has not changed is not sent."""
-        self._html(self._step, markup.step(snapshot))
-        self._html(self._value, markup.value(snapshot))
-        self._html(self._messages, markup.messages(snapshot))
-        self._html(self._candidate, markup.candidate(snapshot))
-        self._html(self._heuristics, markup.heuristics(snapshot))
-        self._html(self._picked, markup.picked(snapshot))
-        self._html(self._legend, markup.legend(snapshot))
+        _show(self._step, markup.step(snapshot))
+        _show(self._value, markup.value(snapshot))
+        _show(self._messages, markup.messages(snapshot))
+        _show(self._candidate, markup.candidate(snapshot))
+        _show(self._heuristics, markup.heuristics(snapshot))
+        _show(self._picked, markup.picked(snapshot))
+        _show(self._legend, markup.legend(snapshot))
         _mark(self._stages, STAGES, snapshot["stage"])
         _mark(self._dimensions, DIMENSIONS, f"{snapshot['dimension']}D")
         _enable(self._accept, snapshot["candidate"] is not None)
@@ -142,11 +142,6 @@ class Panel:
         _enable(self._hand, snapshot["row"] is not None)
         _relabel(self._hand, HAND_OFF if snapshot["nudging"] else BY_HAND)
         self._show_layers(snapshot["layers"])
-
-    @staticmethod
-    def _html(handle: viser.GuiHtmlHandle, content: str) -> None:
-        if handle.content != content:
-            handle.content = content
 
     def _show_layers(self, layers: list[dict[str, Any]]) -> None:
         for layer in layers:
@@ -168,6 +163,28 @@ class Panel:
     def _switched(self, event: viser.GuiEvent[viser.GuiCheckboxHandle], name: str) -> None:
         if event.client is not None:  # otherwise it was the panel itself, following the view
             self._do(lambda: self._view.switch_layer(name, event.target.value))
+
+
+class Onlookers:
+    """The panel of those who may only look: what is shown, in words, and nothing to press."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(WIDTH)
+        self._parts = {part: gui.add_html("") for part in (markup.step, markup.value, markup.candidate, markup.picked)}
+        with gui.add_folder("Legend"):
+            self._parts[markup.legend] = gui.add_html("")
+
+    def show(self, snapshot: Mapping[str, Any]) -> None:
+        """Bring everything up to a snapshot."""
+        for part, handle in self._parts.items():
+            _show(handle, part(snapshot))
+
+
+def _show(handle: viser.GuiHtmlHandle, content: str) -> None:
+    """Change a part of the panel, where it is another one."""
+    if handle.content != content:
+        handle.content = content
 
 
 def _mark(group: viser.GuiButtonGroupHandle, names: tuple[str, ...], here: str) -> None:
