@@ -27,20 +27,6 @@ __all__ = [
     "points",
     "star",
 ]
-    "Array32",
-    "Box",
-    "Drawable",
-    "Frame",
-    "Pick",
-    "around",
-    "box",
-    "dashes",
-    "label",
-    "lift",
-    "lines",
-    "points",
-    "star",
-]
 
 Frame: TypeAlias = Literal["first", "second", "map"]
 """``first``: map 1, where the scene's origin is; ``second``: moves with the candidate; ``map``: the merged map"""

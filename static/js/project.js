@@ -19,6 +19,7 @@ import { ParameterDrawer } from "./parameters.js";
 import { pair } from "./format.js";
 import { Queue, stateLabel } from "./queue.js";
 import { cover, scene } from "./scene.js";
+import { sharing } from "./share.js";
 import { Stream } from "./stream.js";
 import { summary } from "./summary.js";
 import { tabs } from "./tabs.js";
@@ -40,7 +41,7 @@ async function start() {
   new Detail(project, view, [candidates, new Heuristics(project), new GraphWords(project), new Why(view)]);
   new Threshold(project, view, queue);
   new ParameterDrawer(project, view);
-  const parts = [reviewer, reasons, head, summary, exportMenu, inputs, loops, mapTools, graphPanel, walkLink];
+  const parts = [reviewer, reasons, head, summary, exportMenu, inputs, loops, mapTools, sharing, graphPanel, walkLink];
   for (const part of parts) part(project, view);
   project.addEventListener("trouble", ({ detail }) => failed(detail));
   integrationLinks(byId("panel-map"), (id) => queue.select(id));
@@ -128,7 +129,7 @@ function back() {
 function remember() {
   const wanted = view.integration ? `#${view.integration}` : "";
   if (location.hash === wanted) return;
-  history.replaceState(null, "", wanted || location.pathname);
+  history.replaceState(null, "", wanted || location.pathname + location.search);
   const row = project.row(view.integration);
   if (row) announce(`${pair(row.id)}, ${stateLabel(row.state)}`);
 }

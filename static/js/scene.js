@@ -19,6 +19,7 @@ export function scene(view, actions) {
 
 /** The colours of the scene follow the browser's, as those of the page do. */
 function theme(view) {
+  if (view.shared) return; // its colours are those of whoever shares it
   view.act("set_theme", DARK.matches ? "dark" : "light").catch((error) => view.project.tell("trouble", error));
 }
 

@@ -16,6 +16,7 @@ export class View extends EventTarget {
     this.project = project;
     this.id = null;
     this.scene = null;
+    this.shared = false;
     this.snapshot = {};
   }
 
@@ -24,13 +25,29 @@ export class View extends EventTarget {
   }
 
   async open(integration = this.integration) {
-    const { id, scene } = await post(`${this.project.url}/views`);
+    const { id, scene } = await this.#opened();
     this.id = id;
     this.scene = scene;
     this.snapshot = { ...this.snapshot, serial: 0 };
     this.dispatchEvent(new Event("opened"));
-    const known = integration && this.project.row(integration);
+    const known = integration && !this.shared && this.project.row(integration);
     this.apply(known ? await post(this.#url, { action: "select", value: integration }) : await get(this.#url));
+  }
+
+  /** The view somebody shares with us, as long as it is there; otherwise one of our own. */
+  async #opened() {
+    const id = new URLSearchParams(location.search).get("view");
+    if (!id) return post(`${this.project.url}/views`);
+    try {
+      await get(`/api/views/${encodeURIComponent(id)}`);
+      this.shared = true;
+      return { id, scene: `/views/${encodeURIComponent(id)}/scene/` };
+    } catch (error) {
+      if (error.status !== 404) throw error;
+      history.replaceState(null, "", location.pathname + location.hash);
+      this.shared = false;
+      return post(`${this.project.url}/views`);
+    }
   }
 
   /** Ask for a change and show it; a view the server no longer has is opened again first. */
@@ -94,7 +111,7 @@ export class View extends EventTarget {
   }
 
   close() {
-    if (this.id !== null) fetch(this.#url, { method: "DELETE", keepalive: true }).catch(() => {});
+    if (this.id !== null && !this.shared) fetch(this.#url, { method: "DELETE", keepalive: true }).catch(() => {});
   }
 
   /** The view is closed and there is nothing left to look at. */

@@ -118,3 +118,56 @@ def test_views_of_a_session_close_with_it(views: Views) -> None:
     first, second = views.open(mine), views.open(session())
     views.close_of(mine)
     assert (first.scene.closed, second.scene.closed) == (True, False)  # type: ignore[attr-defined]
+
+
+# --- sharing --------------------------------------------------------------------------------------
+
+
+def test_a_view_is_followed_by_a_name_of_its_own(views: Views) -> None:
+    """The name is made once, leads to the view, is not its id, and ends with it; nobody follows what is not shared."""
+    opened = views.open(None)  # type: ignore[arg-type]
+    with pytest.raises(UnknownError):
+        views.followed("")
+    token = views.share(opened.id).follow
+    assert views.share(opened.id).follow == token
+    assert token != opened.id
+    assert views.followed(token) is opened
+    with pytest.raises(UnknownError):
+        views.get(token)
+    with pytest.raises(UnknownError):
+        views.followed(opened.id)
+    views.close(opened.id)
+    with pytest.raises(UnknownError, match="has ended"):
+        views.followed(token)
+
+
+def test_one_scene_for_all_who_follow(clock: Clock) -> None:
+    """It is made when the first of them comes, is the same for all, and closes with the view."""
+    made: list[Thing] = []
+
+    def audience(_: Any) -> Any:
+        made.append(Thing())
+        return made[-1]
+
+    views = Views(lambda _: (Thing(), Thing()), make_audience=audience, clock=clock)  # type: ignore[arg-type, return-value]
+    opened = views.open(None)  # type: ignore[arg-type]
+    token = views.share(opened.id).follow
+    assert made == []
+    assert views.audience_of(token) is views.audience_of(token)
+    assert len(made) == 1
+    views.close(opened.id)
+    assert made[0].closed
+
+
+def test_who_follows_keeps_the_view_open(views: Views, clock: Clock) -> None:
+    """A view stays as long as somebody follows it, though the page that shared it is loaded again."""
+    opened = views.open(None)  # type: ignore[arg-type]
+    token = views.share(opened.id).follow
+    with views.watched(token):
+        clock.now = 500.0
+        views.reap()
+        assert views.followed(token) is opened
+    clock.now = 1000.0
+    views.reap()
+    with pytest.raises(UnknownError):
+        views.followed(token)
