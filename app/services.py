@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from app.classes import Classes
 from app.jobs import WarmUp
 from app.streams import Streams
 from app.views import Views
@@ -15,12 +16,13 @@ __all__ = ["Services"]
 
 @dataclass(frozen=True)
 class Services:
-    """The projects, the open views, the event streams, the walkthroughs, and the kernels' compilation."""
+    """The projects, the open views, the event streams, the walkthroughs, the classes, and the kernels' compilation."""
 
     workspace: Workspace
     views: Views = field(default_factory=Views)
     streams: Streams = field(default_factory=Streams)
     walks: Walks = field(default_factory=Walks)
+    classes: Classes = field(default_factory=Classes)
     warm_up: WarmUp | None = None
 
     def start(self) -> None:

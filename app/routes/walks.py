@@ -7,7 +7,9 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query
 from fastapi.responses import FileResponse, Response
+from pydantic import Field
 
+from app.bodies import Body, Name
 from app.errors import RequestError, UnknownError
 from app.lesson import lesson_document
 from app.resources import static_folder
@@ -40,6 +42,38 @@ class AskedSteps(AskedStage):
 def walk_page() -> FileResponse:
     """The player."""
     return FileResponse(static_folder() / "walk.html")
+
+
+class Place(Body):
+    """Where a walkthrough is: its address after the question mark."""
+
+    place: Annotated[str, Field(min_length=1, max_length=2000)]
+
+
+class Led(Place):
+    """Where a class is led, by whoever shared it."""
+
+    key: Name
+
+
+@router.post("/api/classes", status_code=201)
+def open_class(site: Site, body: Place) -> dict[str, Any]:
+    """Share a walkthrough: an id for the link of those who follow, and the key of the one who leads."""
+    made = site.classes.open(body.place)
+    return {"id": made.id, "key": made.key}
+
+
+@router.get("/api/classes/{id}")
+def followed(site: Site, id: Annotated[str, Path(max_length=40)]) -> dict[str, Any]:
+    """Where a class is; ``serial`` grows with every move."""
+    found = site.classes.get(id)
+    return {"place": found.place, "serial": found.serial}
+
+
+@router.post("/api/classes/{id}")
+def lead(site: Site, id: Annotated[str, Path(max_length=40)], body: Led) -> dict[str, Any]:
+    """Lead a class on."""
+    return {"serial": site.classes.move(id, body.key, body.place).serial}
 
 
 @router.get("/api/lesson")

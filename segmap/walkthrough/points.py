@@ -120,7 +120,7 @@ class _Scan:
         )
         name = ("first", "second")[self.which - 1]
         say = (
-            f"The {_count(len(self.map), 'segment')} of scan {self.which}: the scan is now a small map, map {self.which}."
+            f"The {_count(len(self.map), 'segment')} of scan {self.which}: it is now a small map, map {self.which}."
             f"{left_out}"
             " Long ones are walls the sensor saw well; many short ones mean clutter."
         )

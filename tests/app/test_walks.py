@@ -8,6 +8,8 @@ import zipfile
 import pytest
 from PIL import Image
 
+from app.classes import Classes
+from app.errors import UnknownError
 from app.lesson import LESSON
 from app.resources import samples_folder, static_folder
 from app.walk_pictures import ROLES
@@ -199,3 +201,33 @@ def test_the_lesson_tells_the_truth(client):
     steps = client.get("/api/walk/steps", params=asked).json()["steps"]
     _, tree, pivot = [float(step["quantities"][-1][1]) for step in steps]
     assert tree > 2.0 * pivot
+
+
+def test_a_class_follows(client):
+    """Who shared leads; who has the link sees where it is, and cannot lead; only walkthroughs can be led to."""
+    place = "sample=hall&pair=0.0-0.1&stage=chains&step=2"
+    made = client.post("/api/classes", json={"place": place})
+    assert made.status_code == 201
+    url, key = f"/api/classes/{made.json()['id']}", made.json()["key"]
+    assert client.get(url).json() == {"place": place, "serial": 1}
+    on = place.replace("step=2", "step=3")
+    assert client.post(url, json={"key": key, "place": on}).json() == {"serial": 2}
+    assert client.get(url).json() == {"place": on, "serial": 2}
+    assert key not in client.get(url).text
+    assert client.post(url, json={"key": "guess", "place": place}).status_code == 404
+    assert client.post(url, json={"key": key, "place": "https://elsewhere.example"}).status_code == 400
+    assert client.get("/api/classes/nobody").status_code == 404
+    assert client.get(url).json()["place"] == on
+
+
+def test_classes_end():
+    """A class nobody moves is over after hours, and there are never more than some."""
+    now = [0.0]
+    classes = Classes(clock=lambda: now[0])
+    made = [classes.open("sample=hall") for _ in range(60)]
+    with pytest.raises(UnknownError):
+        classes.get(made[0].id)
+    assert classes.get(made[-1].id).serial == 1
+    now[0] = 1e6
+    with pytest.raises(UnknownError, match="over"):
+        classes.get(made[-1].id)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import re
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,12 @@ class Walk:
     @property
     def drawn(self) -> dict[str, Any]:
         return dict(self.page.evaluate(DRAWN))
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """The words of the step: pictures are as large as there is room."""
+        drawn = self.drawn
+        return drawn["said"], drawn["line"], drawn["quantities"]
 
     @property
     def place(self) -> str:
@@ -136,6 +143,23 @@ def test_a_real_pair(desk: Any, server: Any, datasets: Path) -> None:
     walk.press("One step on (right arrow)")
     walk.press("One step back (left arrow)")
     assert walk.drawn == first
+
+
+def test_a_class_follows_its_teacher(new_desk: Any, server: Any) -> None:
+    """Who opens the link sees each step of the teacher's, and has nothing to press."""
+    teacher, pupil = Walk(new_desk()), Walk(new_desk())
+    teacher.open(f"{server.url}/walk?sample=laboratory&heuristic=consecutive&stage=chains")
+    teacher.page.get_by_role("button", name="Share with a class").click()
+    link = re.search(r"http\S+follow=\S+", teacher.page.locator(".notice.link").inner_text())
+    assert link
+    pupil.open(link[0])
+    pupil.desk.until(lambda: pupil.told == teacher.told, "the teacher's view")
+    teacher.press("One step on (right arrow)")
+    pupil.desk.until(lambda: pupil.told == teacher.told, "the teacher's step")
+    teacher.stage("result")
+    pupil.desk.until(lambda: pupil.told == teacher.told, "the teacher's stage")
+    assert not pupil.page.locator(".controls").is_visible()
+    pupil.desk.picture("walk-followed")
 
 
 def test_a_file_plays_without_a_network(desk: Any, server: Any, tmp_path: Path) -> None:

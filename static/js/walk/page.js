@@ -1,6 +1,7 @@
 // The page of a walkthrough: what is walked through stands in the address, and so does the step that is shown.
 
 import { get } from "../api.js";
+import { follow, teaching } from "./classes.js";
 import { byId, fill, h, text } from "../dom.js";
 import { failed } from "../notices.js";
 import { Player } from "./player.js";
@@ -9,10 +10,15 @@ import { races } from "./races.js";
 const AHEAD = 12;
 const QUESTION = ["project", "sample", "pair", "merge", "node", "graph", "mode", "heuristic", "set"];
 
-const question = new URLSearchParams(location.search);
+let question = new URLSearchParams(location.search);
 const known = new Map();
 
-start().catch(unavailable);
+const following = question.get("follow");
+const lead = teaching(() => String(here));
+let here = question;
+let player = null;
+
+(following ? follow(following, led) : start()).catch(unavailable);
 
 async function start() {
   fill(byId("player"), h("p.message", { role: "status" }, "Integrating the scans, and noting every step…"));
@@ -21,12 +27,20 @@ async function start() {
   lesson().catch(failed);
   text(byId("name"), walk.title);
   document.title = `${walk.title} – segmap`;
-  const player = new Player(byId("player"), { ...walk, title: "Stages" }, { load, open, enter: into });
-  player.addEventListener("step", ({ detail }) => remember(detail));
+  player = new Player(byId("player"), { ...walk, title: "Stages" }, { load, open, enter: into });
+  player.addEventListener("step", ({ detail }) => following || remember(detail));
   byId("player").setAttribute("aria-busy", "false");
   await player.go(question.get("stage") || walk.stages[0].id, question.get("step") ?? 0);
   if (question.get("play") !== null) player.play();
-  addEventListener("popstate", () => location.reload());
+}
+
+/** Where the class is led: within the same walkthrough to another step, or to another one. */
+async function led(place) {
+  document.body.classList.add("following");
+  const same = player && String(asked()) === String(asked({}, place));
+  question = place;
+  if (same) await player.go(place.get("stage"), place.get("step"));
+  else await start();
 }
 
 /** Of a stop of the lesson: what it is about, and the way on. */
@@ -44,8 +58,8 @@ async function lesson() {
 }
 
 /** The part of the address that says what is walked through, with more for one request. */
-function asked(more = {}) {
-  const held = [...question].filter(([name]) => QUESTION.includes(name));
+function asked(more = {}, of = question) {
+  const held = [...of].filter(([name]) => QUESTION.includes(name));
   return new URLSearchParams([...held, ...Object.entries(more)]);
 }
 
@@ -83,6 +97,8 @@ function keep(stage, start, count) {
 
 function remember({ stage, step }) {
   const there = new URLSearchParams([...asked(), ["stage", stage], ["step", step]]);
+  here = new URLSearchParams(there);
+  lead.tell();
   if (question.get("lesson")) there.set("lesson", question.get("lesson"));
   history.replaceState(null, "", `?${there}`);
 }
@@ -100,7 +116,7 @@ function choices(walk) {
   const back = project && h("a.button", { href: `/projects/${encodeURIComponent(project)}` }, "Back to the project");
   const out = question.get("node") && h("a.button", { href: `?${without("node")}` }, "Back to the merge");
   const racing = !walk.merging && !question.get("graph") && !question.get("node") && races(asked);
-  fill(byId("tools"), racing, saving(), out, back);
+  fill(byId("tools"), !following && [lead.button, racing, saving(), out, back]);
 }
 
 function without(name) {
