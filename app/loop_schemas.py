@@ -54,6 +54,14 @@ class Strength(BaseModel):
     """the scan whose place is least sure"""
     deviation: float
     """metres, standard deviation of its place"""
+    loop: str | None
+    """the integration that closes the loop which misses itself most; None where there is none"""
+    loop_scans: int
+    """scans round that loop"""
+    loop_error: float | None
+    """metres, by which it misses itself"""
+    loop_turn: float | None
+    """radians, the same"""
 
 
 class Silenced(BaseModel):

@@ -10,9 +10,23 @@ from functools import cached_property
 from typing import Any
 
 from app.jobs import Check, Latest
+from app.pairs import are_neighbours
 from app.review import Fate
 from segmap.events import Covariance, Decision, IntegrationId
-from segmap.graph import Edge, Optimised, Preview, Residual, Strength, Ways, explain, optimise, preview, strength
+from segmap.graph import (
+    Edge,
+    Loop,
+    Optimised,
+    Preview,
+    Residual,
+    Strength,
+    Ways,
+    explain,
+    loop_of,
+    optimise,
+    preview,
+    strength,
+)
 from segmap.merging import Accepted
 from segmap.pose import Pose2
 from segmap.project import ProjectState
@@ -28,6 +42,8 @@ UNTOLD: Covariance = (
 )
 
 
+LOOPS = 12
+"""loops of each component that are looked at for the one that misses itself most"""
 FAR_OFF = 0.4
 """metres; an integration farther from where the others have it is not believed, however little it claims to know:
 right closures of public logs are at most 0.34 m off"""
@@ -101,6 +117,18 @@ class Graph:
     def _ways(self) -> Ways:
         return self.optimised.ways()
 
+    @cached_property
+    def loops(self) -> tuple[Loop | None, ...]:
+        """Of each component the loop that misses itself most, of those that the integrations farthest off close."""
+        return tuple(self._worst(number) for number in range(len(self.optimised.components)))
+
+    def _worst(self, component: int) -> Loop | None:
+        held = {id(edge) for edge in self.optimised.counting(component)}
+        those = [r for r in self.optimised.residuals if id(r.edge) in held and not _follow(r.edge)]
+        asked = sorted(those, key=lambda residual: -residual.translation)[:LOOPS]
+        found = [loop for residual in asked if (loop := loop_of(residual.edge, self._ways)) is not None]
+        return max(found, key=lambda loop: loop.translation, default=None)
+
     def fate(self, integration: str, T_1_2: Pose2 | None) -> Fate | None:
         """How far a pose of an integration is from where the graph has it; None where the graph says nothing."""
         held = self.residuals.get(integration)
@@ -130,12 +158,20 @@ class Graph:
             "revision": self.revision,
             "edges": len(self.edges),
             "silenced": silenced,
-            "strengths": [_strength(one) for one in self.strengths],
+            "strengths": [_strength(*one) for one in zip(self.strengths, self.loops, strict=True)],
         }
 
 
-def _strength(one: Strength) -> dict[str, Any]:
+def _follow(one: Edge) -> bool:
+    return are_neighbours(min(one.first, one.second), max(one.first, one.second))
+
+
+def _strength(one: Strength, worst: Loop | None) -> dict[str, Any]:
     return {
+        "loop": worst.edge.name if worst else None,
+        "loop_scans": len(worst.scans) if worst else 0,
+        "loop_error": worst.translation if worst else None,
+        "loop_turn": worst.rotation if worst else None,
         "first": str(one.scans[0]),
         "scans": len(one.scans),
         "edges": one.edges,

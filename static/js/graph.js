@@ -79,7 +79,8 @@ function draw({ edges, silenced, strengths, optimising }) {
   fill(byId("graph-strength"), edges ? strengths.map(strength) : null);
 }
 
-function strength({ first, scans, edges, bridges, hanging, softest, deviation }, index) {
+function strength(one, index) {
+  const { first, scans, edges, bridges, hanging, softest, deviation } = one;
   const loops = edges - scans + 1;
   const size = `${count(edges, "integration")} hold ${count(scans, "scan")}: ${count(loops, "loop")}`;
   const name = h("h3", {}, `How firmly component ${index + 1} holds`);
@@ -87,7 +88,14 @@ function strength({ first, scans, edges, bridges, hanging, softest, deviation },
   const list = bridges.length ? h("details", {}, h("summary", {}, "Which"), h("p.ids", {}, bridges.slice(0, 200).map((id) => [link(id), " "]))) : null;
   const hangs = hanging ? h("p", {}, `${count(hanging, "scan")} hang on by one integration.`) : null;
   const soft = h("p", {}, `Least sure is scan ${softest}, seen from ${first}: ± ${metres(deviation)}.`);
-  return h("li", {}, name, h("p", {}, `${size}. ${held}${bridges.length ? "." : ""}`), list, hangs, soft);
+  return h("li", {}, name, h("p", {}, `${size}. ${held}${bridges.length ? "." : ""}`), list, hangs, misses(one), soft);
+}
+
+/** By how much the loop misses itself that does most. */
+function misses({ loop, loop_scans, loop_error, loop_turn }) {
+  if (!loop) return null;
+  const size = count(loop_scans, "scan");
+  return h("p", {}, `The largest loop closure error is ${off(loop_error, loop_turn)}, round the ${size} that `, link(loop), " closes.");
 }
 
 function link(id) {
