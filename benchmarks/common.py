@@ -11,9 +11,12 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
+
 from segmap.benchmark import NEGATIVE, Pair, PairSet
 from segmap.logs import read_log
 from segmap.parameters import Parameters
+from segmap.pose import Pose2
 from segmap.scans import LaserLog
 from segmap.segments import Order, SegmentMap, extract
 
@@ -57,6 +60,16 @@ def load(logs: Path, pairs: Path) -> list[LogPairs]:
     if not sets:
         raise SystemExit(f"There are no pair sets (*.json) in {pairs}: give their folder with --pairs.")
     return [LogPairs(name, read_log(logs / pair_set.log), pair_set.pairs) for name, pair_set in sets]
+
+
+def laid_on(found: Sequence[Pose2], true: Sequence[Pose2]) -> Pose2:
+    """The motion that lays poses on those they should be at, at best: the least squares of their distances."""
+    a, b = (np.array([(pose.x, pose.y) for pose in poses]) for poses in (found, true))
+    centre_a, centre_b = a.mean(axis=0), b.mean(axis=0)
+    u, v = (a - centre_a) @ (1, 1j), (b - centre_b) @ (1, 1j)
+    turn = float(np.angle(np.vdot(u, v)))
+    x, y = centre_b - Pose2(0.0, 0.0, turn) @ centre_a
+    return Pose2(float(x), float(y), turn)
 
 
 def trimmed(logs: Sequence[LogPairs], sizes: tuple[int, int], parameters: Parameters) -> tuple[SegmentMap, SegmentMap]:

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 from closures import LOGS, pose_of
-from common import arguments, markdown, provenance
+from common import arguments, laid_on, markdown, provenance
 from scipy.spatial import cKDTree
 
 from segmap.logs import read_log
@@ -86,13 +86,7 @@ def _taking_turns(count: int) -> list[list[int]]:
 
 def _aligned(found: Sequence[Pose2], true: Sequence[Pose2]) -> FloatArray:
     """How far poses are from where they should be, metres and degrees (n, 2), once all are laid on them at best."""
-    a, b = (np.array([(pose.x, pose.y) for pose in poses]) for poses in (found, true))
-    centre_a, centre_b = a.mean(axis=0), b.mean(axis=0)
-    u, v = (a - centre_a) @ (1, 1j), (b - centre_b) @ (1, 1j)
-    turn = float(np.angle(np.vdot(u, v)))
-    cosine, sine = math.cos(turn), math.sin(turn)
-    place = centre_b - np.array([[cosine, -sine], [sine, cosine]]) @ centre_a
-    T = Pose2(float(place[0]), float(place[1]), turn)
+    T = laid_on(found, true)
     return np.array([(d, math.degrees(t)) for p, q in zip(found, true, strict=True) for d, t in [(T @ p).distance(q)]])
 
 

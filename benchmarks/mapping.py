@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from common import SHARED, arguments, markdown, provenance
+from common import SHARED, arguments, laid_on, markdown, provenance
 
 from segmap.export import write_map
 from segmap.fusion import fuse_all, spurious_length
@@ -127,13 +127,16 @@ def _against(mapped: Mapped) -> list[str]:
 
 
 def draw(mapped: Mapped, parameters: Parameters, folder: Path) -> None:
-    """The map beside what the log's own poses give."""
+    """The largest component, laid on the log's own poses at best, beside the map that these give."""
     maps = {ScanId(0, i): extract(scan, parameters, 0, i) for i, scan in enumerate(mapped.log)}
     own = {scan: mapped.true(scan) for scan in maps}
-    logged = Component("logged", tuple(sorted(own)), own, fuse_all(maps, own, parameters))
+    logged = Component("the log's own poses", tuple(sorted(own)), own, fuse_all(maps, own, parameters))
+    part = mapped.parts[0]
+    T = laid_on([part.poses[scan] for scan in part.scans], [own[scan] for scan in part.scans])
+    poses = {scan: T @ pose for scan, pose in part.poses.items()}
+    ours = Component("from the scans alone", part.scans, poses, part.map.moved(T))
     folder.mkdir(parents=True, exist_ok=True)
-    write_map(mapped.parts[:1], folder / f"{mapped.name}.svg", metadata={"title": mapped.name})
-    write_map([logged], folder / f"{mapped.name}-logged.svg", metadata={"title": f"{mapped.name}, poses of the log"})
+    write_map([ours, logged], folder / f"{mapped.name}.png", metadata={"title": mapped.name})
 
 
 def main() -> None:
