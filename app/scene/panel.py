@@ -178,7 +178,7 @@ class Onlookers:
     def show(self, snapshot: Mapping[str, Any]) -> None:
         """Bring everything up to a snapshot."""
         for part, handle in self._parts.items():
-            _show(handle, part(snapshot))
+            _show(handle, "" if part is markup.picked and snapshot["picked"] is None else part(snapshot))
 
 
 def _show(handle: viser.GuiHtmlHandle, content: str) -> None:
