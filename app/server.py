@@ -26,7 +26,7 @@ from app.errors import RequestError
 from app.failures import answer_failures
 from app.jobs import WarmUp
 from app.resources import program_version, static_folder
-from app.routes import follow, keeping, loops, pages, projects, review, stream, views, walks
+from app.routes import classes, follow, keeping, loops, pages, projects, review, stream, views, walks
 from app.schemas import Failure
 from app.security import UPLOAD_BYTES, WILDCARDS, Guard
 from app.services import Services
@@ -52,6 +52,7 @@ ROUTERS = (
     views.router,
     follow.router,
     walks.router,
+    classes.router,
     proxy.router,
 )
 

@@ -7,9 +7,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query
 from fastapi.responses import FileResponse, Response
-from pydantic import Field
 
-from app.bodies import Body, Name
 from app.errors import RequestError, UnknownError
 from app.lesson import lesson_document
 from app.resources import static_folder
@@ -20,7 +18,7 @@ from app.walks import STEPS, Asked, Made, Subject, choices, document, stage_docu
 from segmap.parameters import describe
 from segmap.walkthrough import SWEPT, Stage, race, sweep
 
-__all__ = ["router"]
+__all__ = ["AskedStage", "made_of", "router", "some_steps", "stage_of"]
 
 router = APIRouter(tags=["walkthrough"])
 
@@ -44,38 +42,6 @@ def walk_page() -> FileResponse:
     return FileResponse(static_folder() / "walk.html")
 
 
-class Place(Body):
-    """Where a walkthrough is: its address after the question mark."""
-
-    place: Annotated[str, Field(min_length=1, max_length=2000)]
-
-
-class Led(Place):
-    """Where a class is led, by whoever shared it."""
-
-    key: Name
-
-
-@router.post("/api/classes", status_code=201)
-def open_class(site: Site, body: Place) -> dict[str, Any]:
-    """Share a walkthrough: an id for the link of those who follow, and the key of the one who leads."""
-    made = site.classes.open(body.place)
-    return {"id": made.id, "key": made.key}
-
-
-@router.get("/api/classes/{id}")
-def followed(site: Site, id: Annotated[str, Path(max_length=40)]) -> dict[str, Any]:
-    """Where a class is; ``serial`` grows with every move."""
-    found = site.classes.get(id)
-    return {"place": found.place, "serial": found.serial}
-
-
-@router.post("/api/classes/{id}")
-def lead(site: Site, id: Annotated[str, Path(max_length=40)], body: Led) -> dict[str, Any]:
-    """Lead a class on."""
-    return {"serial": site.classes.move(id, body.key, body.place).serial}
-
-
 @router.get("/api/lesson")
 def lesson() -> dict[str, Any]:
     """The stops of the guided lesson, each with the address of its view."""
@@ -92,17 +58,13 @@ def overview(site: Site, asked: Annotated[Asked, Query()]) -> dict[str, Any]:
 @router.get("/api/walk/stage")
 def stage(site: Site, asked: Annotated[AskedStage, Query()]) -> dict[str, Any]:
     """A stage that is made when somebody enters it, such as one candidate pair by pair."""
-    return stage_document(_stage(_made(site, asked), asked.stage))
+    return stage_document(stage_of(made_of(site, asked), asked.stage))
 
 
 @router.get("/api/walk/steps")
 def steps(site: Site, asked: Annotated[AskedSteps, Query()]) -> dict[str, Any]:
     """Steps of a stage, any of them without those before."""
-    held = _stage(_made(site, asked), asked.stage)
-    if asked.start >= held.count:
-        raise UnknownError(f"The stage {held.id!r} has {held.count} steps; there is no step {asked.start}.")
-    last = min(held.count, asked.start + asked.count)
-    return {"start": asked.start, "steps": [held.step(k).to_json() for k in range(asked.start, last)]}
+    return some_steps(stage_of(made_of(site, asked), asked.stage), asked.start, asked.count)
 
 
 class AskedFile(AskedStage):
@@ -116,7 +78,7 @@ def file(
     site: Site, kind: Annotated[str, Path(description=" or ".join(KINDS))], asked: Annotated[AskedFile, Query()]
 ) -> Response:
     """A walkthrough as one HTML file that plays offline, as numbered PNGs, or as an animated GIF."""
-    made = _made(site, asked)
+    made = made_of(site, asked)
     found = walk_file(made.walk, kind, asked.stage, asked.most)
     return Response(found.content, media_type=found.media_type, headers=attached(made.walk.title, found.suffix))
 
@@ -154,13 +116,27 @@ def _pair_of(site: Site, asked: Asked) -> Subject:
     return subject
 
 
-def _made(site: Site, asked: AskedStage) -> Made:
+def made_of(site: Site, asked: AskedStage) -> Made:
+    """The walkthrough a request is about."""
     only = Asked(**{name: getattr(asked, name) for name in Asked.model_fields})
     return site.walks.get(only, site.workspace)[1]
 
 
-def _stage(made: Made, id: str) -> Stage:
+def stage_of(made: Made, id: str) -> Stage:
+    """A stage of it. Raises UnknownError where there is none."""
     found = made.walk.stage(id)
     if found is None:
         raise UnknownError(f"This walkthrough has no stage {id!r}.")
     return found
+
+
+def some_steps(held: Stage, start: int, count: int) -> dict[str, Any]:
+    """Steps of a stage as an answer.
+
+    Raises:
+        UnknownError: the stage has fewer.
+    """
+    if start >= held.count:
+        raise UnknownError(f"The stage {held.id!r} has {held.count} steps; there is no step {start}.")
+    last = min(held.count, start + count)
+    return {"start": start, "steps": [held.step(k).to_json() for k in range(start, last)]}

@@ -208,16 +208,23 @@ def test_a_class_follows(client):
     place = "sample=hall&pair=0.0-0.1&stage=chains&step=2"
     made = client.post("/api/classes", json={"place": place})
     assert made.status_code == 201
-    url, key = f"/api/classes/{made.json()['id']}", made.json()["key"]
-    assert client.get(url).json() == {"place": place, "serial": 1}
+    id, key = made.json()["id"], made.json()["key"]
+    url, seen = f"/api/classes/{id}", f"/follow/walk/{id}"
+    assert client.get(f"{seen}/place").json() == {"place": place, "serial": 1}
     on = place.replace("step=2", "step=3")
     assert client.post(url, json={"key": key, "place": on}).json() == {"serial": 2}
-    assert client.get(url).json() == {"place": on, "serial": 2}
-    assert key not in client.get(url).text
+    assert client.get(f"{seen}/place").json() == {"place": on, "serial": 2}
+    assert key not in client.get(f"{seen}/place").text
+    asked = {"sample": "hall", "pair": "0.0-0.1", "stage": "chains", "start": 3}
+    followed = client.get(f"{seen}/api/steps", params={"stage": "chains", "start": 3}).json()
+    assert followed == client.get("/api/walk/steps", params=asked).json()
+    elsewhere = client.get(f"{seen}/api", params={"sample": "laboratory"}).json()
+    assert elsewhere == client.get("/api/walk", params={"sample": "hall", "pair": "0.0-0.1"}).json()
     assert client.post(url, json={"key": "guess", "place": place}).status_code == 404
     assert client.post(url, json={"key": key, "place": "https://elsewhere.example"}).status_code == 400
-    assert client.get("/api/classes/nobody").status_code == 404
-    assert client.get(url).json()["place"] == on
+    assert client.get("/follow/walk/nobody/place").status_code == 404
+    assert client.get("/follow/walk/nobody/api").status_code == 404
+    assert client.get(f"{seen}/place").json()["place"] == on
 
 
 def test_classes_end():

@@ -150,7 +150,7 @@ def test_a_class_follows_its_teacher(new_desk: Any, server: Any) -> None:
     teacher, pupil = Walk(new_desk()), Walk(new_desk())
     teacher.open(f"{server.url}/walk?sample=laboratory&heuristic=consecutive&stage=chains")
     teacher.page.get_by_role("button", name="Share with a class").click()
-    link = re.search(r"http\S+follow=\S+", teacher.page.locator(".notice.link").inner_text())
+    link = re.search(r"http\S+/follow/walk/\S+", teacher.page.locator(".notice.link").inner_text())
     assert link
     pupil.open(link[0])
     pupil.desk.until(lambda: pupil.told == teacher.told, "the teacher's view")

@@ -15,7 +15,7 @@ export function teaching(place) {
   const open = async () => {
     led ??= await post("/api/classes", { place: place() });
     sessionStorage.setItem(HELD, JSON.stringify(led));
-    const link = `${location.origin}/walk?follow=${led.id}`;
+    const link = `${location.origin}/follow/walk/${led.id}`;
     await navigator.clipboard?.writeText(link).catch(() => {});
     notice(`Whoever opens ${link} sees what you see, and can change nothing.`, { kind: "link" });
   };
@@ -27,7 +27,7 @@ export function teaching(place) {
 export async function follow(id, moved) {
   let serial = 0;
   const look = async () => {
-    const now = await get(`/api/classes/${encodeURIComponent(id)}`);
+    const now = await get(`/follow/walk/${encodeURIComponent(id)}/place`);
     if (now.serial === serial) return;
     serial = now.serial;
     await moved(new URLSearchParams(now.place));

@@ -13,7 +13,8 @@ const QUESTION = ["project", "sample", "pair", "merge", "node", "graph", "mode",
 let question = new URLSearchParams(location.search);
 const known = new Map();
 
-const following = question.get("follow");
+const [, , , following] = location.pathname.startsWith("/follow/") ? location.pathname.split("/") : [];
+const api = following ? `/follow/walk/${following}/api` : "/api/walk";
 const lead = teaching(() => String(here));
 let here = question;
 let player = null;
@@ -22,7 +23,7 @@ let player = null;
 
 async function start() {
   fill(byId("player"), h("p.message", { role: "status" }, "Integrating the scans, and noting every step…"));
-  const walk = await get(`/api/walk?${asked()}`);
+  const walk = await get(following ? api : `${api}?${asked()}`);
   choices(walk);
   lesson().catch(failed);
   text(byId("name"), walk.title);
@@ -70,7 +71,7 @@ function into(node) {
 
 async function open(stage) {
   try {
-    return await get(`/api/walk/stage?${asked({ stage })}`);
+    return await get(`${api}/stage?${following ? new URLSearchParams({ stage }) : asked({ stage })}`);
   } catch (error) {
     return failed(error), null;
   }
@@ -87,7 +88,8 @@ async function load(stage, number) {
 }
 
 function keep(stage, start, count) {
-  const answer = get(`/api/walk/steps?${asked({ stage: stage.id, start, count })}`);
+  const which = { stage: stage.id, start, count };
+  const answer = get(`${api}/steps?${following ? new URLSearchParams(which) : asked(which)}`);
   for (let place = 0; place < count; place += 1) {
     const step = answer.then(({ steps }) => steps[place]);
     known.set(`${stage.id} ${start + place}`, step);
