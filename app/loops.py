@@ -9,12 +9,9 @@ from app.deciding import covariance_at
 from app.jobs import Check
 from app.kept import ResultStore
 from app.posegraph import Graph, PoseGraph, Solver, edge
-from app.review import Fate, Outcome
 from app.searching import WORKERS, Found, LoopSearch, Searching, find_closures
 from segmap.errors import ProjectError
 from segmap.graph import Preview
-from segmap.pose import Pose2
-from segmap.project import ProjectState
 from segmap.spreading import Told
 
 if TYPE_CHECKING:
@@ -63,12 +60,6 @@ class Loops:
     def optimising(self) -> bool:
         """Whether the pose graph is being optimised again."""
         return self._graph.busy
-
-    def fate(self, integration: str, state: ProjectState, outcome: Outcome | None) -> Fate | None:
-        """How far an integration is from where the graph has it: the pose decided on, or else the best found."""
-        decision = state.decisions.get(integration)
-        found = None if outcome is None or outcome.pose is None else Pose2(*outcome.pose)
-        return self.graph.fate(integration, decision.T_1_2 if decision else found)
 
     def preview(self, integration: str, heuristic: str | None = None, rank: int = 0) -> Preview:
         """What accepting a candidate would do to the graph.

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Coroutine
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
@@ -112,8 +111,8 @@ async def page(site: Site, view: str, request: Request) -> Response:
         raise RequestError(
             f"The scene takes no {foreign[0][:40]!r} in its address; it takes {', '.join(sorted(QUERY))}."
         )
-    answer = await _fetch((await run_in_threadpool(_scene_of, site, request, view)).port, "/")
-    return Response(_with_script(answer.content), media_type="text/html", headers={"Content-Security-Policy": POLICY})
+    html = await _page((await run_in_threadpool(_scene_of, site, request, view)).port)
+    return Response(html, media_type="text/html", headers={"Content-Security-Policy": POLICY})
 
 
 @router.get(STEER + "/{path:path}")
@@ -152,11 +151,16 @@ async def _fetch(port: int, path: str) -> httpx.Response:
         raise UnknownError("The scene of this view is closed: load the page again.") from None
 
 
-@lru_cache(maxsize=2)
-def _with_script(html: bytes) -> bytes:
+_pages: dict[str, bytes] = {}
+"""viser's page with our script, fetched once: that of every view is the same"""
+
+
+async def _page(port: int) -> bytes:
     """The page with our script as the first thing in its head."""
-    before, head, after = html.partition(b"<head>")
-    return before + head + SCRIPT + after
+    if "/" not in _pages:
+        before, head, after = (await _fetch(port, "/")).content.partition(b"<head>")
+        _pages["/"] = before + head + SCRIPT + after
+    return _pages["/"]
 
 
 async def _bridge(browser: WebSocket, scene: Scene) -> None:

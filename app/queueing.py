@@ -11,6 +11,7 @@ from app.criterion import CRITERIA, Criterion
 from app.later import Later
 from app.loops import Loops
 from app.matching import Matching
+from app.queue_text import QueueText, QueueTexts
 from app.review import Flips, Row, Rows, counts, flips, queue
 from segmap.project import ProjectState
 
@@ -27,6 +28,7 @@ class Queueing(ABC):
     _matching: Matching
     _rows: Rows
     _later: Later
+    _texts: QueueTexts
     _version = 0
     """of the rows: another one after every change"""
     _queue: tuple[int, tuple[Row, ...]] = (-1, ())
@@ -41,8 +43,7 @@ class Queueing(ABC):
         """An integration as the queue shows it."""
         state = self._state
         outcome = self._matching.outcome(self._checked(integration), state.heuristic)
-        fate = self.loops.fate(integration, state, outcome)
-        return self._rows.row(integration, state, outcome, fate, integration in self._later)
+        return self._rows.row(integration, state, outcome, self.loops.graph, integration in self._later)
 
     def put_off(self, integration: str) -> None:
         """Skip an integration for now: in the queue it comes after the others that wait. Nothing is decided."""
@@ -52,17 +53,26 @@ class Queueing(ABC):
 
     def rows(self) -> list[Row]:
         """The review queue, the integration that most needs a person first."""
+        return list(self._ordered())
+
+    def queue_text(self) -> QueueText:
+        """The same as the pages get it."""
+        return self._texts.of(self._ordered())
+
+    def _ordered(self) -> tuple[Row, ...]:
+        """The same tuple as long as it holds the same rows."""
         with self._lock:
             version, held = self._queue
             if version != self._version:
                 state, version = self._state, self._version
-                held = tuple(queue((self.row(name) for name in self._integrations), state.mode, state.parameters))
+                found = tuple(queue(map(self.row, self._integrations), state.mode, state.parameters))
+                held = held if found == held else found
                 self._queue = (version, held)
-            return list(held)
+            return held
 
     def counts(self) -> Mapping[str, int]:
         """How many integrations there are, in all and in each state."""
-        return counts(self.rows())
+        return counts(self._ordered())
 
     @property
     def criterion(self) -> Criterion:
@@ -75,10 +85,12 @@ class Queueing(ABC):
         Raises:
             ParameterError: it is out of bounds.
         """
-        state, rows = self._state, self.rows()
+        state = self._state
         parameters = self.criterion.moved(state.parameters, value)
-        found = {r.id: self._matching.outcome(r.id, state.heuristic) for r in rows}
-        return flips(rows, [self._rows.tried(id, state, outcome, parameters) for id, outcome in found.items()])
+        pending = [row for row in self._ordered() if row.state == "pending"]
+        found = (self._matching.outcome(row.id, state.heuristic) for row in pending)
+        moved = (self._rows.moved(row, state, one, parameters) for row, one in zip(pending, found, strict=True))
+        return flips(pending, moved)
 
     def _resort(self) -> None:
         with self._lock:

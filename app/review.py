@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import operator
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol, TypeAlias
 
 from app.criterion import CRITERIA, Criterion
 from app.pairs import kind_of
-from segmap.events import Covariance, Decision, IntegrationId
+from segmap.events import Covariance, Decision, IntegrationId, Proposal
 from segmap.integration import Match, Verdict, findings_of
 from segmap.links import covariance_of
 from segmap.parameters import Parameters
@@ -18,7 +19,7 @@ from segmap.project import ProjectState
 from segmap.scans import ScanId
 from segmap.verdict import Findings, judge
 
-__all__ = ["Fate", "Flips", "Outcome", "Row", "Rows", "counts", "flips", "queue", "row"]
+__all__ = ["Fate", "Fates", "Flips", "Outcome", "Row", "Rows", "counts", "flips", "queue", "row"]
 
 STATES = ("pending", "failed", "none", "matching", "accepted", "rejected")
 """In queue order: what a person can decide, what a person should know, what is not ready, what is done."""
@@ -144,12 +145,26 @@ def row(blank: Row, heuristic: str, outcome: Outcome | None, decision: Decision 
     return _decided(found, decision, outcome is not None and _same(decision.T_1_2, outcome.pose))
 
 
+class Fates(Protocol):
+    """What knows how far an integration is from where the graph has it."""
+
+    def fate(self, integration: str, T_1_2: Pose2 | None) -> Fate | None: ...
+
+
+_Grounds: TypeAlias = tuple[Outcome | None, Decision | None, Proposal | None, tuple[Any, ...], Fates | None, bool]
+
+
+def _identical(held: _Grounds, now: _Grounds) -> bool:
+    return all(map(operator.is_, held, now))
+
+
 class Rows:
     """The rows of some integrations, each made again only when what it shows has changed."""
 
     def __init__(self, integrations: Iterable[str]) -> None:
         self._blank: dict[str, Row] = {}
-        self._made: dict[str, tuple[Outcome | None, Decision | None, tuple[Any, ...], Row]] = {}
+        self._made: dict[str, tuple[_Grounds, Row]] = {}
+        self._settings: tuple[Any, ...] = ()
         self.add(integrations)
 
     def add(self, integrations: Iterable[str]) -> None:
@@ -166,18 +181,31 @@ class Rows:
         integration: str,
         state: ProjectState,
         outcome: Outcome | None,
-        fate: Fate | None = None,
+        graph: Fates | None = None,
         later: bool = False,
     ) -> Row:
-        """The row of an integration in a state of the project."""
-        decision, settings = state.decisions.get(integration), (*_settings(state, integration), fate, later)
+        """The row of an integration in a state of the project; one that shows the same is the same object."""
+        decision, proposal = state.decisions.get(integration), state.proposals.get(integration)
+        grounds = outcome, decision, proposal, self._current(state), graph, later
         held = self._made.get(integration)
-        if held and held[0] is outcome and held[1] is decision and held[2] == settings:
-            return held[3]
-        made = _fated(self.tried(integration, state, outcome, state.parameters), fate)
+        if held and _identical(held[0], grounds):
+            return held[1]
+        made = self.tried(integration, state, outcome, state.parameters)
         made = replace(made, later=later and decision is None)
-        self._made[integration] = outcome, decision, settings, made
+        if graph is not None:
+            found = None if outcome is None or outcome.pose is None else Pose2(*outcome.pose)
+            made = _fated(made, graph.fate(integration, decision.T_1_2 if decision else found))
+        if held and held[1] == made:
+            made = held[1]
+        self._made[integration] = grounds, made
         return made
+
+    def _current(self, state: ProjectState) -> tuple[Any, ...]:
+        """What rows show of a project's settings; the same object as long as it is the same."""
+        found = state.heuristic, *(getattr(state.parameters, name) for name in THRESHOLDS)
+        if found != self._settings:
+            self._settings = found
+        return self._settings
 
     def tried(self, integration: str, state: ProjectState, outcome: Outcome | None, parameters: Parameters) -> Row:
         """The row as it would be under other thresholds; nothing is kept."""
@@ -185,6 +213,12 @@ class Rows:
         blank = replace(blank, kind=kind_of(IntegrationId(blank.first, blank.second), state))
         found = row(blank, state.heuristic, outcome, state.decisions.get(integration), parameters)
         return replace(found, **_LEFT_TO_A_PERSON) if _proposed_elsewhere(found, state, outcome) else found
+
+    def moved(self, held: Row, state: ProjectState, outcome: Outcome | None, parameters: Parameters) -> Row:
+        """A pending row as far as the program's word goes under other thresholds."""
+        passes = outcome is not None and outcome.verdict(parameters) is Verdict.ACCEPTED
+        above = passes and not _proposed_elsewhere(held, state, outcome)
+        return held if above == held.above else replace(held, above=above)
 
 
 _LEFT_TO_A_PERSON: Mapping[str, Any] = {"verdict": str(Verdict.REVIEW), "above": False}
@@ -196,13 +230,6 @@ def _proposed_elsewhere(found: Row, state: ProjectState, outcome: Outcome | None
     if found.state != "pending" or outcome is None or proposal is None or proposal.kind != "closure":
         return False
     return proposal.T_1_2 is not None and not _same(proposal.T_1_2, outcome.pose)
-
-
-def _settings(state: ProjectState, integration: str) -> tuple[Any, ...]:
-    """What a row shows of a project's settings, and of who asked for it."""
-    proposal = state.proposals.get(integration)
-    thresholds = (getattr(state.parameters, name) for name in THRESHOLDS)
-    return state.heuristic, proposal.kind if proposal else "", *thresholds
 
 
 def _fated(found: Row, fate: Fate | None) -> Row:

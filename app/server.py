@@ -18,15 +18,14 @@ from fastapi import FastAPI
 from rich.console import Console
 from rich.text import Text
 from starlette.concurrency import run_in_threadpool
-from starlette.staticfiles import StaticFiles
 
 from app import proxy
 from app.access import PARAMETER, token_for
 from app.errors import RequestError
 from app.failures import answer_failures
 from app.jobs import WarmUp
-from app.resources import program_version, static_folder
-from app.routes import classes, follow, keeping, loops, pages, projects, review, stream, views, walks
+from app.resources import program_version
+from app.routes import classes, files, follow, keeping, loops, pages, projects, review, stream, views, walks
 from app.schemas import Failure
 from app.security import UPLOAD_BYTES, WILDCARDS, Guard
 from app.services import Services
@@ -44,6 +43,7 @@ GRACE_SECONDS = 3
 SOCKET_BYTES = 64 * 1024 * 1024
 ROUTERS = (
     pages.router,
+    files.router,
     projects.router,
     keeping.router,
     review.router,
@@ -87,7 +87,6 @@ def create_app(
     app.state.services, app.state.token = services, token
     for router in ROUTERS:
         app.include_router(router)
-    app.mount("/static", StaticFiles(directory=static_folder()), name="static")
     answer_failures(app)
     app.add_middleware(Guard, bound=bound, upload_bytes=upload_bytes, token=token)
     return app

@@ -20,8 +20,9 @@ from app.listeners import Listener, Listeners
 from app.loops import Loops
 from app.matching import Matching, Progress, Settings
 from app.merged import Extractor, Merged, MergedMap, map_parameters
-from app.pairs import integrations_of
+from app.pairs import Pairs
 from app.posegraph import Solver, graph_of
+from app.queue_text import QueueTexts
 from app.queueing import Queueing
 from app.reporting import Reporter
 from app.review import Outcome, Rows
@@ -67,9 +68,9 @@ class Session(Steps, Queueing):
         self._inputs = Inputs(store, self._state.logs, store.log_bytes, known_logs)
         self.extractor: Extractor = self._inputs.segment_map
         """the segments of a scan under any parameters"""
-        self._integrations = tuple[str, ...]()
+        self._pairs, self._integrations = Pairs(), tuple[str, ...]()
         self._rows = Rows(())
-        self._later = Later(store)
+        self._later, self._texts = Later(store), QueueTexts()
         self._matching = Matching(
             store,
             self._match,
@@ -311,7 +312,7 @@ class Session(Steps, Queueing):
     def _follow(self, change: Change, before: ProjectState) -> None:
         """Let the matches and the merged map be those of a state."""
         state = change.state
-        self._integrations = integrations_of(state, self._inputs.scan_ids)
+        self._integrations = self._pairs.of(state, self._inputs.scan_ids)
         self._rows.add(self._integrations)
         self._matching.use(Settings(state.parameters, state.mode), state.heuristic, self._integrations)
         placed = any(is_accepted(s, name) for s in (before, state) for name in change.integrations)

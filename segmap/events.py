@@ -16,6 +16,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Annotated, Any, Literal, NamedTuple, Self, TypeAlias
 
 from pydantic import (
@@ -82,14 +83,19 @@ class IntegrationId(NamedTuple):
         Raises:
             ProjectError: it names none, or not the earlier scan first.
         """
-        first, _, second = text.partition("-")
-        try:
-            pair = cls(ScanId.parse(first), ScanId.parse(second))
-        except ScanError:
-            raise ProjectError(f"{text[:80]!r} names no integration: write two scans, as in 0.12-0.13.") from None
-        if pair.first >= pair.second:
-            raise ProjectError(f"{text} names no integration: write two different scans, the earlier one first.")
-        return pair
+        return _parsed(text)
+
+
+@lru_cache(1 << 16)  # the names of a project are read again with every decision
+def _parsed(text: str) -> IntegrationId:
+    first, _, second = text.partition("-")
+    try:
+        pair = IntegrationId(ScanId.parse(first), ScanId.parse(second))
+    except ScanError:
+        raise ProjectError(f"{text[:80]!r} names no integration: write two scans, as in 0.12-0.13.") from None
+    if pair.first >= pair.second:
+        raise ProjectError(f"{text} names no integration: write two different scans, the earlier one first.")
+    return pair
 
 
 def fingerprint(parameters: Parameters) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request, Response
 
 from app.claims import CLAIMED, NUDGED, described
 from app.errors import RequestError
@@ -35,10 +35,16 @@ __all__ = ["detail", "made", "router"]
 router = APIRouter(prefix="/api/projects/{project}", tags=["review"])
 
 
-@router.get("/integrations")
-def integrations(session: Opened) -> Queue:
+@router.get("/integrations", response_model=Queue)
+def integrations(session: Opened, request: Request) -> Response:
     """All integrations, the one that most needs a person first."""
-    return Queue(integrations=[Integration.of(row) for row in session.rows()])
+    text = session.queue_text()
+    headers = {"ETag": text.tag, "Vary": "Accept-Encoding"}
+    if text.tag in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    if "gzip" in request.headers.get("accept-encoding", ""):
+        return Response(text.packed, media_type="application/json", headers=headers | {"Content-Encoding": "gzip"})
+    return Response(text.plain, media_type="application/json", headers=headers)
 
 
 @router.get("/integrations/{integration}")
