@@ -20,7 +20,7 @@ from segmap.walkthrough import Stage, Step, Walkthrough
 __all__ = ["KINDS", "MOST_FRAMES", "WalkFile", "frames", "offline", "walk_file"]
 
 SCRIPTS = ("dom.js", "walk/figure.js", "walk/chart.js", "walk/player.js", "walk/offline.js")
-STYLES = ("base.css", "walk.css")
+STYLES = ("base.css", "figures.css", "walk.css")
 IMPORT = re.compile(r"^import .*?;$\n?", re.MULTILINE)
 EXPORT = re.compile(r"^export ", re.MULTILINE)
 WHOLE = 400

@@ -45,7 +45,7 @@ ROLES = {
     "chain-6": "#6f8f00",
     "chain-7": "#b745ca",
 }
-"""colours on white, those of static/css/walk.css"""
+"""colours on white, those of static/css/figures.css"""
 INK, MUTED, SUNKEN, RULE = "#18212b", "#566371", "#eef1f4", "#dbe1e7"
 
 Place = Callable[[float, float], tuple[float, float]]

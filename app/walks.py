@@ -37,7 +37,18 @@ from segmap.walkthrough import (
     walk_scans,
 )
 
-__all__ = ["STEPS", "Asked", "Made", "Subject", "Walks", "choices", "document", "stage_document", "subject_of"]
+__all__ = [
+    "MOST_MERGED",
+    "STEPS",
+    "Asked",
+    "Made",
+    "Subject",
+    "Walks",
+    "choices",
+    "document",
+    "stage_document",
+    "subject_of",
+]
 
 KEPT = 6
 """walkthroughs held at a time; one of 20,000 candidates takes some megabytes"""

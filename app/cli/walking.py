@@ -1,4 +1,4 @@
-"""``walkthrough``: an integration step by step, as a file for a lecture."""
+"""``walkthrough``: an integration, or a merge, step by step, as a file for a lecture."""
 
 from __future__ import annotations
 
@@ -7,10 +7,25 @@ from typing import Annotated
 
 import typer
 
-from app.cli.options import DEFAULT_MODE, Heuristic, Log, Mode, Preset, Setting, method_of, read
+from app.cli.options import (
+    DEFAULT_MODE,
+    Heuristic,
+    Log,
+    Method,
+    Mode,
+    Preset,
+    Setting,
+    method_of,
+    read,
+    segment_maps,
+    topic_of,
+)
 from app.errors import RequestError
 from app.walk_files import KINDS, MOST_FRAMES, walk_file
-from segmap.walkthrough import walk_scans
+from app.walks import MOST_MERGED
+from segmap.logs import holds_maps
+from segmap.scans import ScanId
+from segmap.walkthrough import Walkthrough, walk_maps, walk_merge, walk_scans
 
 __all__ = ["walkthrough"]
 
@@ -31,6 +46,9 @@ def walkthrough(
     heuristic: Heuristic = None,
     preset: Preset = None,
     settings: Setting = None,
+    merging: Annotated[
+        bool, typer.Option("--merge", help="Scans I to J merged by all three methods, and their pose graph.")
+    ] = False,
     stage: Annotated[
         str, typer.Option(metavar="ID", help="Pictures of this stage only, such as evaluation or polylines.")
     ] = "",
@@ -41,17 +59,31 @@ def walkthrough(
     """Record how scan J is integrated with scan I, step by step, as a file to show.
 
     Every step is there: points to segments, angles, candidates and their values, lines of sight, chains, polylines,
-    the verdict; where there are very many of a kind, some of them.
+    the verdict; where there are very many of a kind, some of them. A file of segment maps takes the place of a log.
     """
     kind = out.suffix.lower().removeprefix(".")
     if kind not in KINDS:
         raise RequestError(f"{out.name}: a walkthrough is written as .{', .'.join(KINDS)}. Choose one of these.")
     method = method_of(mode, heuristic, preset, settings)
-    held = read(log)
-    title = f"{held.name}: scans {first} and {second}"
-    made = walk_scans(
-        held.scan(first), held.scan(second), method.parameters, method.heuristic, method.mode, title=title
-    )
-    file = walk_file(made.walk, kind, stage, pictures)
+    made = _merge(log, first, second, method) if merging else _pair(log, first, second, method)
+    file = walk_file(made, kind, stage, pictures)
     out.write_bytes(file.content)
-    typer.echo(f"{out}: {len(made.walk.stages)} stages, {len(file.content) / 1e6:.1f} MB")
+    typer.echo(f"{out}: {len(made.stages)} stages, {len(file.content) / 1e6:.1f} MB")
+
+
+def _pair(log: Path, first: int, second: int, method: Method) -> Walkthrough:
+    how = method.parameters, method.heuristic, method.mode
+    if holds_maps(topic_of(log)[0]):
+        name, map_of = segment_maps(log, method.parameters)
+        return walk_maps(map_of(first), map_of(second), *how, f"{name}: maps {first} and {second}").walk
+    held = read(log)
+    return walk_scans(held.scan(first), held.scan(second), *how, f"{held.name}: scans {first} and {second}").walk
+
+
+def _merge(log: Path, first: int, last: int, method: Method) -> Walkthrough:
+    if not 1 <= last - first < MOST_MERGED:
+        raise RequestError(f"A merge is shown of 2 to {MOST_MERGED} scans: give I and J so that I to J are as many.")
+    name, map_of = segment_maps(log, method.parameters)
+    maps = {ScanId(0, scan): map_of(scan) for scan in range(first, last + 1)}
+    title = f"{name}: merging {first} to {last}"
+    return walk_merge(maps, method.parameters, method.heuristic, method.mode, title).walk

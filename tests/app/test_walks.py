@@ -104,7 +104,7 @@ def test_files(client):
 
 def test_colours_of_files_are_those_of_the_page():
     """Images and the player give each role one colour."""
-    css = (static_folder() / "css" / "walk.css").read_text()
+    css = (static_folder() / "css" / "figures.css").read_text()
     light = dict(re.findall(r"--((?:role|chain)-[\w-]+): (#\w{6});", css.split("@media")[0]))
     told = {name.removeprefix("role-"): colour for name, colour in light.items()}
     assert {name: ROLES[name] for name in told} == told
@@ -118,6 +118,10 @@ def test_command(run, tmp_path):
     assert status == 0
     assert "stages" in told
     assert "Hall" in out.read_text() or "hall.log" in out.read_text()
+    merged = tmp_path / "merge.html"
+    assert run("walkthrough", log, 10, 12, "--merge", "--out", merged)[0] == 0
+    assert "The three methods compared" in merged.read_text()
+    assert run("walkthrough", log, 10, 50, "--merge", "--out", merged)[0] == 2
     assert run("walkthrough", log, 0, 1, "--out", tmp_path / "hall.mp4")[0] == 2
     assert run("walkthrough", log, 0, 999, "--out", out)[0] == 2
 
