@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from app.cli import walking
 from app.cli.options import one_of
 from app.inputs import Inputs
 from app.matching import Settings, recall
@@ -20,6 +21,7 @@ from segmap.store import Store
 
 __all__ = ["export", "replay", "report", "sample", "serve"]
 
+WALKTHROUGH = "walkthrough"
 Project = Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file, .segmap.", show_default=False)]
 
 
@@ -53,7 +55,7 @@ def serve(
 
 def export(
     project: Project,
-    to: Annotated[str, typer.Option(metavar=one_of(FORMATS), help="The format.", show_default=False)],
+    to: Annotated[str, typer.Option(metavar=one_of((*FORMATS, WALKTHROUGH)), help="The format.", show_default=False)],
     out: Annotated[Path, typer.Option(metavar="PATH", help="The file to write.", show_default=False)],
     resolution: Annotated[
         float, typer.Option(metavar="METRES", help="The side of a cell, for formats that are made of cells.")
@@ -61,8 +63,12 @@ def export(
 ) -> None:
     """Write the map of a project: what is accepted in it, and nothing else.
 
-    Where a format takes several files, the others are put beside the one that is named.
+    Where a format takes several files, the others are put beside the one that is named. A walkthrough shows step by
+    step how its first pair was integrated, and its pose graph; "segmap walkthrough" makes one of any pair.
     """
+    if to == WALKTHROUGH:
+        walking.of_project(project, out)
+        return
     _write(project, out, format_of(to), resolution)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -21,13 +23,16 @@ from app.cli.options import (
     topic_of,
 )
 from app.errors import RequestError
+from app.inputs import Inputs
+from app.posegraph import edges_of
 from app.walk_files import KINDS, MOST_FRAMES, walk_file
 from app.walks import MOST_MERGED
 from segmap.logs import holds_maps
 from segmap.scans import ScanId
-from segmap.walkthrough import Walkthrough, walk_maps, walk_merge, walk_scans
+from segmap.store import Store
+from segmap.walkthrough import Walkthrough, walk_graph, walk_maps, walk_merge, walk_scans
 
-__all__ = ["walkthrough"]
+__all__ = ["of_project", "walkthrough"]
 
 
 def walkthrough(
@@ -61,11 +66,42 @@ def walkthrough(
     Every step is there: points to segments, angles, candidates and their values, lines of sight, chains, polylines,
     the verdict; where there are very many of a kind, some of them. A file of segment maps takes the place of a log.
     """
+    kind = _kind(out)
+    method = method_of(mode, heuristic, preset, settings)
+    made = _merge(log, first, second, method) if merging else _pair(log, first, second, method)
+    _write(made, out, kind, stage, pictures)
+
+
+def of_project(project: Path, out: Path) -> None:
+    """Write the walkthrough of a project: its first accepted integration, and the pose graph of all of them."""
+    kind = _kind(out)
+    with Store.open(project) as store:
+        state = store.state
+        inputs = Inputs(store, state.logs, store.log_bytes)
+        edges = edges_of(state)
+        first, second = (edges[0].first, edges[0].second) if edges else _first_two(inputs.scan_ids)
+        title = f"{state.name}: scans {first} and {second}"
+        how = state.parameters, state.heuristic, state.mode, title
+        made = walk_scans(inputs.scan(first), inputs.scan(second), *how).walk
+        held = sorted({scan for edge in edges for scan in (edge.first, edge.second)})
+        graph = walk_graph(edges, {scan: inputs.segment_map(scan, state.parameters) for scan in held})
+    _write(replace(made, stages=made.stages + graph.stages, base={**made.base, **graph.base}), out, kind)
+
+
+def _first_two(scans: Sequence[ScanId]) -> tuple[ScanId, ScanId]:
+    if len(scans) < 2:
+        raise RequestError("A walkthrough takes two scans; this project has fewer.")
+    return scans[0], scans[1]
+
+
+def _kind(out: Path) -> str:
     kind = out.suffix.lower().removeprefix(".")
     if kind not in KINDS:
         raise RequestError(f"{out.name}: a walkthrough is written as .{', .'.join(KINDS)}. Choose one of these.")
-    method = method_of(mode, heuristic, preset, settings)
-    made = _merge(log, first, second, method) if merging else _pair(log, first, second, method)
+    return kind
+
+
+def _write(made: Walkthrough, out: Path, kind: str, stage: str = "", pictures: int = MOST_FRAMES) -> None:
     file = walk_file(made, kind, stage, pictures)
     out.write_bytes(file.content)
     typer.echo(f"{out}: {len(made.stages)} stages, {len(file.content) / 1e6:.1f} MB")

@@ -242,3 +242,15 @@ def test_classes_end():
     now[0] = 1e6
     with pytest.raises(UnknownError, match="over"):
         classes.get(made[-1].id)
+
+
+def test_a_project_as_a_walkthrough(run, client, project, tmp_path):
+    """export --to walkthrough writes the first accepted pair step by step, and the graph of all of them."""
+    ids = [row["id"] for row in client.get(f"/api/projects/{project}/integrations").json()["integrations"]]
+    client.post(f"/api/projects/{project}/decisions", json={"integrations": ids, "verdict": "accepted"})
+    file, out = tmp_path / "copy.segmap", tmp_path / "walk.html"
+    file.write_bytes(client.get(f"/api/projects/{project}/download").content)
+    assert run("export", file, "--to", "walkthrough", "--out", out)[0] == 0
+    assert '"id":"refinement"' in out.read_text()
+    assert '"id":"graph"' in out.read_text()
+    assert run("export", file, "--to", "walkthrough", "--out", tmp_path / "walk.exe")[0] == 2
