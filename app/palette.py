@@ -30,6 +30,8 @@ class Palette:
     """what one should look at: the superimposed angle, what was clicked"""
     good: RGB
     bad: RGB
+    doubtful: RGB
+    """for words; in drawings ``sights`` has a stronger one"""
     sights: tuple[RGB, ...]
     """of returns that are supported, contradicted, shadowed and unseen"""
     chains: tuple[RGB, ...]
@@ -98,6 +100,7 @@ PALETTES = {
         accent=_rgb("c3225b"),
         good=_rgb("12805c"),
         bad=_rgb("c22f2f"),
+        doubtful=_rgb("8a5a00"),
         sights=_several("12805c c22f2f f08c00 a3adb8"),
         chains=_several("0067be e83c28 1d978f c3225b 52b4ff 662512 5834ed ff9400"),
         values=_several("c9d3de 7fb2d6 2f86c1 1b5a97 0b2f5c"),
@@ -112,6 +115,7 @@ PALETTES = {
         accent=_rgb("ff63bd"),
         good=_rgb("3ccf91"),
         bad=_rgb("ff7b72"),
+        doubtful=_rgb("e9b64c"),
         sights=_several("3ccf91 ff5a50 ffa94d 6b7785"),
         chains=_several("249cff ff8a1f 12b886 ff63bd bde3ff a67c3a b745ca ffe066"),
         values=_several("3c4754 2f6690 3a9bc9 84d2dc f4f1a6"),

@@ -24,6 +24,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.typing import Subprotocol
 
+from app.dressing import SCRIPT, STYLE
 from app.errors import RequestError, UnknownError
 from app.routes.common import Site
 from app.security import own_origin
@@ -31,7 +32,7 @@ from app.security import own_origin
 if TYPE_CHECKING:
     from app.scene import Scene
 
-__all__ = ["POLICY", "SCRIPT", "router"]
+__all__ = ["POLICY", "router"]
 
 HOST = "127.0.0.1"
 QUERY = frozenset({"darkMode", "fixedDpr"})
@@ -42,50 +43,6 @@ POLICY = (
     "font-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
 """viser needs inline and evaluated scripts; nothing is loaded from, or sent to, another origin"""
-SCRIPT = b"""<script>
-(() => {
-  // In 2D (a field of view of one degree) every drag moves the map, and no key turns the camera.
-  const moves = /^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/;
-  const viewer = () => window.__viserMutable ?? {};
-  const flat = () => viewer().camera?.fov < 5;
-  const set = (held, name, value) => { if (held && held[name] !== value) held[name] = value; };
-  addEventListener("keydown", (event) => {
-    if (!flat() || !moves.test(event.code) || event.target.closest?.("input, textarea")) return;
-    event.stopImmediatePropagation();
-  }, true);
-  setInterval(() => {
-    const control = viewer().cameraControl, held = flat();
-    if (!control || !viewer().camera) return;
-    set(control.mouseButtons, "left", held ? 2 : 1);
-    set(control.touches, "one", held ? 128 : 64);
-    set(control, "dollyToCursor", held);
-    scaleBar(held, control.distance);
-  }, 100);
-
-  // How long a metre is on the screen: only in 2D, where it is the same everywhere.
-  const bar = Object.assign(document.createElement("div"), { id: "scale-bar", ariaHidden: "true" });
-  bar.style.cssText = "position:fixed;left:14px;bottom:14px;z-index:5;padding:0 4px 2px;pointer-events:none;" +
-    "font:600 12px system-ui,sans-serif;border:solid;border-width:0 2px 2px;text-align:center;" +
-    "color:var(--mantine-color-text,#444);border-color:currentColor";
-  const nice = (most) => {
-    const power = 10 ** Math.floor(Math.log10(most));
-    return [5, 2, 1].find((step) => step * power <= most) * power;
-  };
-  const scaleBar = (shown, distance) => {
-    if (!bar.isConnected && document.body) document.body.append(bar);
-    bar.hidden = !shown;
-    const canvas = document.querySelector("canvas"), tall = canvas?.clientHeight;
-    if (!shown || !tall || !(distance > 0)) return;
-    const metre = tall / (2 * distance * Math.tan((viewer().camera.fov * Math.PI) / 360));
-    const length = nice(120 / metre);
-    bar.style.width = `${length * metre}px`;
-    bar.textContent = length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
-  };
-})();
-</script>
-"""
-"""put into viser's page; uses its own test hook, so viser's version is pinned"""
-
 router = APIRouter(include_in_schema=False)
 STEER, FOLLOW = "/views/{view}/scene", "/follow/{view}/scene"
 """of who may steer the view, and of who may only look; each is known by a name of its own"""
@@ -156,10 +113,10 @@ _pages: dict[str, bytes] = {}
 
 
 async def _page(port: int) -> bytes:
-    """The page with our script as the first thing in its head."""
+    """The page with our script and our colours as the first things in its head."""
     if "/" not in _pages:
         before, head, after = (await _fetch(port, "/")).content.partition(b"<head>")
-        _pages["/"] = before + head + SCRIPT + after
+        _pages["/"] = before + head + SCRIPT + STYLE + after
     return _pages["/"]
 
 

@@ -106,7 +106,7 @@ def _side(snapshot: Snapshot, held: float) -> tuple[str, str]:
     if snapshot["above"]:
         return enough, _colour(snapshot, "good")
     if snapshot["verdict"] == "review":
-        doubtful = hexadecimal(PALETTES[snapshot["theme"]].sights[CLASSES.index("shadowed")])
+        doubtful = _colour(snapshot, "doubtful")
         return (f"in doubt, though {enough}" if held >= snapshot["threshold"] else short), doubtful
     return short, _colour(snapshot, "bad")
 

@@ -51,7 +51,8 @@ function component({ name, scans, segments, length }, colours, hidden, count_) {
   const size = `${count(scans.length, "scan")}, ${count(segments, "segment")}, ${metres(length, 1)} of walls`;
   const list = h("details", {}, h("summary", {}, `Scans ${first} to ${scans.at(-1)}`), h("p.ids", {}, scans.join(", ")));
   const swatch = h("span.swatch", { "aria-hidden": "true" });
-  swatch.style.background = colours[first] ?? "transparent";
+  swatch.hidden = !colours[first];
+  swatch.style.background = colours[first] ?? "";
   const shown = !hidden.includes(first);
   const see = choice("toggle_component", first, shown ? "Hide" : "Show", `${shown ? "Hide" : "Show"} ${name} in the scene`);
   const only = choice("isolate", first, shown && hidden.length ? "All" : "Only", `Show only ${name}, or all again`);

@@ -18,7 +18,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from app.proxy import POLICY, SCRIPT
+from app.dressing import SCRIPT
+from app.proxy import POLICY
 from app.server import create_app
 from app.workspace import Workspace
 

@@ -38,7 +38,7 @@ CLIPPED = """() => {
 
 
 def complaints(page: Any) -> list[str]:
-    """What axe-core calls serious, each with the elements it is about; the scene's own page is not ours."""
+    """What axe-core calls serious, each with the elements it is about; of a page, or of a frame in it."""
     found = axe_playwright.Axe().run(page, context={"exclude": [["iframe"]]})
     return [
         f"{one['id']}: {node['target']} {' '.join(node['failureSummary'].split())}"
@@ -103,7 +103,7 @@ def test_home_page(new_desk: Callable[..., Any], server: Any, worked_on: str, sc
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_project_page(new_desk: Callable[..., Any], server: Any, worked_on: str, scheme: str) -> None:
-    """Every tab, menu, drawer and sheet of a project's page has nothing serious against it."""
+    """Every tab, menu, drawer and sheet of a project's page, and its scene, has nothing serious against it."""
     desk = new_desk(1440, 900, scheme=scheme)
     page = desk.page
     desk.open(server.url + worked_on)
@@ -117,6 +117,8 @@ def test_project_page(new_desk: Callable[..., Any], server: Any, worked_on: str,
     page.get_by_text("How firmly component 1 holds").wait_for()
     found["map"] = complaints(page)
     desk.picture(f"looks-project-{scheme}")
+    desk.scene.wait_for_function("() => !document.querySelector('button:not([aria-label]):empty')")
+    found["scene"] = complaints(desk.scene)
     for opener, closer in (
         ("#parameters-open", "#parameters-close"),
         ("#help-open", "#help button"),
