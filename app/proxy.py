@@ -76,7 +76,8 @@ async def page(site: Site, view: str, request: Request) -> Response:
 @router.get(FOLLOW + "/{path:path}")
 async def asset(site: Site, view: str, path: str, request: Request) -> Response:
     """Anything else of viser's page."""
-    answer = await _fetch(_scene_of(site, request, view).port, "/" + quote(path))
+    scene = await run_in_threadpool(_scene_of, site, request, view)
+    answer = await _fetch(scene.port, "/" + quote(path))
     kind = answer.headers.get("content-type")
     return Response(answer.content, answer.status_code, media_type=kind, headers={"Content-Security-Policy": POLICY})
 
@@ -90,7 +91,7 @@ async def socket(site: Site, view: str, browser: WebSocket) -> None:
         return
     try:
         with site.views.watched(view):
-            await _bridge(browser, _scene_of(site, browser, view))
+            await _bridge(browser, await run_in_threadpool(_scene_of, site, browser, view))
     except UnknownError:
         await browser.close(1008)
 
