@@ -31,7 +31,7 @@ export class GraphWords {
   /** Another candidate: what would come of accepting that one? */
   mark({ integration, snapshot }) {
     if (!this.row || this.row.id !== integration) return;
-    const asked = this.row.state !== "accepted" && (this.row.kind !== "neighbour" || this.row.residual !== null);
+    const asked = this.row.state !== "accepted" && !snapshot.trial && !snapshot.held;
     const query = `heuristic=${encodeURIComponent(snapshot.heuristic ?? "")}&candidate=${snapshot.candidate ?? 0}`;
     const wanted = asked && snapshot.candidates > 0 ? `${this.project.url}/integrations/${encodeURIComponent(integration)}/preview?${query}` : "";
     if (wanted === this.#wanted) return;
