@@ -6,6 +6,7 @@ import { failed, notice } from "../notices.js";
 
 const EVERY = 700;
 const HELD = "segmap.class";
+const WORDS = { "aria-label": "Share with a class", title: "A link through which others see what you see" };
 
 /** A button that gives a link to share; from then on every step of this page is told. */
 export function teaching(place) {
@@ -19,7 +20,7 @@ export function teaching(place) {
     await navigator.clipboard?.writeText(link).catch(() => {});
     notice(`Whoever opens ${link} sees what you see, and can change nothing.`, { kind: "link" });
   };
-  const button = h("button", { type: "button", id: "share", onclick: () => open().catch(failed) }, "Share with a class");
+  const button = h("button", { type: "button", id: "share", ...WORDS, onclick: () => open().catch(failed) }, "Share");
   return { button, tell };
 }
 

@@ -8,6 +8,7 @@ import { Player } from "./player.js";
 import { races } from "./races.js";
 
 const AHEAD = 12;
+const RESTING = 150;
 const QUESTION = ["project", "sample", "pair", "merge", "node", "graph", "mode", "heuristic", "set"];
 
 let question = new URLSearchParams(location.search);
@@ -18,6 +19,7 @@ const api = following ? `/follow/walk/${following}/api` : "/api/walk";
 const lead = teaching(() => String(here));
 let here = question;
 let player = null;
+let waiting = 0;
 
 (following ? follow(following, led) : start()).catch(unavailable);
 
@@ -82,8 +84,10 @@ async function load(stage, number) {
   const key = (place) => `${stage.id} ${place}`;
   if (!known.has(key(number))) keep(stage, number, 1);
   const step = await known.get(key(number));
+  clearTimeout(waiting);
   const next = number + 1;
-  if (next < stage.count && !known.has(key(next))) keep(stage, next, Math.min(AHEAD, stage.count - next));
+  const ahead = () => known.has(key(next)) || keep(stage, next, Math.min(AHEAD, stage.count - next));
+  if (next < stage.count) waiting = setTimeout(ahead, RESTING);
   return step;
 }
 
@@ -115,7 +119,7 @@ function choices(walk) {
   byId("mode").addEventListener("change", () => (byId("heuristic").value = ""));
   byId("how").addEventListener("submit", (event) => (event.preventDefault(), again()));
   const project = question.get("project");
-  const back = project && h("a.button", { href: `/projects/${encodeURIComponent(project)}` }, "Back to the project");
+  const back = project && h("a.button", { href: `/projects/${encodeURIComponent(project)}` }, "Project");
   const out = question.get("node") && h("a.button", { href: `?${without("node")}` }, "Back to the merge");
   const racing = !walk.merging && !question.get("graph") && !question.get("node") && races(asked);
   fill(byId("tools"), !following && [lead.button, racing, saving(), out, back]);
