@@ -229,3 +229,26 @@ def test_real_pairs_fill_the_tables(script, benchmarks, datasets):
     assert np.mean(list(found["All transformations"].values())) >= 0.75
     errors = script("fusion_errors").all_errors(logs, preset("paper-lab"), every=30)
     assert np.mean(errors.distances[:, 2] < 0.040) > 0.9
+
+
+def test_a_copy_without_reports_tells_nothing_and_is_otherwise_the_same(script, tmp_path):
+    """Every report is taken out, and nothing else."""
+    taken = script("tracing_cost").without_reports(tmp_path)
+    texts = {path.relative_to(tmp_path): path.read_text() for path in (tmp_path / "segmap").rglob("*.py")}
+    assert taken > 15
+    assert sum("tracing.tell(" in text for text in texts.values()) == 0
+    untouched = [path for path in texts if "tracing.tell(" not in (ROOT / path).read_text()]
+    assert all(texts[path] == (ROOT / path).read_text() for path in untouched)
+
+
+def test_robustness_to_parameters_and_to_a_prior(script, held):
+    """A scan with itself stays right over wide ranges; a prior that is sure and far off leaves nothing to accept."""
+    robustness = script("robustness")
+    first, *tables = robustness.robust([held], 2)
+    assert "1 pairs" in first
+    rows = {table.split()[1]: cells(table)[1:] for table in tables}
+    assert list(rows) == list(robustness.SWEEPS)
+    assert ["0.03", "100.0"] in rows["point_distance_tolerance"]
+    told = cells(robustness.sensitive([held], 1))[1:]
+    assert told[0][:3] == ["no prior", "100.0", told[0][2]]
+    assert told[-1][-3:] == ["0.0", "0.0", "0.0"]

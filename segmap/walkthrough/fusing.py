@@ -134,7 +134,7 @@ def polylines_stage(trace: Trace, parameters: Parameters) -> list[Stage]:
         return []
     largest = max(range(len(all_members)), key=lambda c: len(all_members[c]))
     firsts = [k for k, state in enumerate(held.states) if state.chain == largest]
-    compared = next(k for k in firsts if held.states[k].event is None)
+    compared = next(k for k in (*held.differing(), *firsts) if held.states[k].event is None)
     stage = Stage(
         id="polylines",
         title="A polyline for each chain",
@@ -173,6 +173,12 @@ class _Polylines:
                 grown = _first_run(trace)[:MOST_ROUNDS]
                 self.states += [_Growth(chain, variant, n, one, event) for n, event in enumerate(grown)]
             self.states.append(_Growth(chain, "both", 0, one, None))
+
+    def differing(self) -> list[int]:
+        """The comparisons of chains of which the two variants make different polylines."""
+        pairs = [(self.lines[c, "greedy"].vertices, self.lines[c, "plain"].vertices) for c in range(len(self.members))]
+        apart = {c for c, (greedy, plain) in enumerate(pairs) if not np.array_equal(greedy, plain)}
+        return [k for k, state in enumerate(self.states) if state.event is None and state.chain in apart]
 
     def step(self, k: int) -> Step:
         """One state."""
@@ -296,9 +302,9 @@ def _spurious(fusion: Fusion) -> Step:
     rows, length = spurious_stretches(fusion.map), spurious_length(fusion.map)
     share = length / float(fusion.map.lengths.sum())
     say = (
-        "Marked are stretches of wall that are in the map twice, close beside each other: they were not fused because"
-        " their chains did not meet. Each further fusion can add more of them; that is why merging by a tree, which"
-        " fuses the same walls again and again, doubles walls."
+        "Marked are stretches of wall that are in the map twice, close beside each other: there two segments of one"
+        " wall did not match closely enough to be fused. Each further fusion can add more of them; that is why merging"
+        " by a tree, which fuses the same walls again and again, doubles walls."
         if len(rows)
         else "No wall is in this map twice. Where the same walls are fused again and again, as by a tree, they double."
     )
