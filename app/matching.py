@@ -162,11 +162,16 @@ class Matching:
 
     def ask(self, integration: str, heuristic: str) -> bool:
         """Look for this match next; False when it is there already. One that failed is tried again."""
+        task = self._task(integration, heuristic)
         with self._lock:
-            if self.match(integration, heuristic) is not None:
-                return False
-            self._backlog.ask(self._task(integration, heuristic))
-            return True
+            held = self.match(integration, heuristic)
+            if held is None:
+                self._backlog.ask(task)
+                return True
+            told = self.outcome(integration, heuristic) is not None
+        if not told:  # the search for loops found it meanwhile
+            self._record(task, Outcome.of(held), held)
+        return False
 
     def outcome(self, integration: str, heuristic: str) -> Outcome | None:
         """What is known of a match; None: not computed yet."""

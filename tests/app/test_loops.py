@@ -346,6 +346,20 @@ def test_a_search_that_was_stopped_goes_on_where_it_was(open_session: Open, monk
     assert session.state.proposals == {closure.integration: closure.proposal for closure in found.closures}
 
 
+def test_what_the_search_matched_is_shown_also_while_matching_is_stopped(open_session: Open, finder: Any) -> None:
+    """Whoever asks for a pair gets it at once."""
+    session = open_session(search_workers=1, find=finder)
+    session.cancel()
+    session.configure({}, mode="verified")
+    session.cancel()
+    session.loops.start()
+    assert session.loops.settle(PATIENCE)
+    asked = len(finder.asked)
+    session.request(FIRST)
+    assert session.row(FIRST).state == "pending"
+    assert len(finder.asked) == asked
+
+
 def test_where_the_search_takes_another_candidate_that_one_is_decided_on(session: Session) -> None:
     """It is shown first, accepted unless another is asked for, and left to a person."""
     session.configure({}, mode="verified")
