@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from segmap.errors import ConflictError, ProjectError
+from segmap.events import Grounds, Nudge
 from segmap.parameters import Parameters
 from segmap.pose import Pose2
 from segmap.project import (
@@ -422,3 +423,32 @@ def test_a_state_does_not_change_by_what_comes_after() -> None:
     assert document(before) == held
     with pytest.raises(TypeError):
         before.decisions["x"] = before.decisions[IDS[0]]  # type: ignore[index]
+
+
+def test_what_is_laid_by_hand_is_a_step_like_any_other() -> None:
+    """It is named, undone and redone; the pair's proposal stays what it was beside it."""
+    state = project()
+    claim = Proposal(integration="0.0-0.2", kind="imported", T_1_2=Pose2(1.0, 0.0, 0.0), source="graph.g2o")
+    state = apply(state, Propose(proposals=(claim,)))
+    nudge = Nudge(T_1_2=Pose2(0.9, 0.1, 0.0), start=Pose2(0.8, 0.0, 0.1), ties=((0, 1), (2, 3)))
+    state = apply(state, Propose(proposals=(claim.model_copy(update={"nudge": nudge}),), who="Ann"))
+    assert state.can_undo == "laid 0.0-0.2 by hand"
+    assert state.proposals["0.0-0.2"].T_1_2 == claim.T_1_2
+    undone = apply(state, Undo())
+    assert undone.proposals["0.0-0.2"] == claim
+    assert apply(undone, Redo()).proposals["0.0-0.2"].nudge == nudge
+
+
+def test_grounds_and_nudges_are_kept_to_the_last_bit_and_nonsense_is_refused() -> None:
+    """As JSON and back; a pose that is not finite, or a segment below 0, is none."""
+    grounds = Grounds(
+        verdict="review", confidence=0.1 + 0.2, score=-1.5, supported=3.0, contradicted=0.25, candidates=7
+    )
+    made = choice("0.0-0.1", "rejected").model_copy(update={"origin": "nudged", "grounds": grounds})
+    event = Decide(choices=(made,), who="Ann")
+    assert event_from_json(event.model_dump_json()) == event
+    pose = Pose2(0.0, 0.0, 0.0)
+    far = Pose2(float("inf"), 0.0, 0.0)
+    for wrong in ({"T_1_2": far, "start": pose}, {"T_1_2": pose, "start": pose, "ties": ((-1, 0),)}):
+        with pytest.raises(ProjectError):
+            Proposal(integration="0.0-0.2", kind="manual", nudge=Nudge(**wrong))
