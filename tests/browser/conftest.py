@@ -126,6 +126,13 @@ class Desk:
         self.until(lambda: any("/scene" in frame.url for frame in self.page.frames), "the scene")
         self.scene.wait_for_function(DRAWN)
 
+    def follow(self, url: str) -> None:
+        """Go to the page of who follows a view; back when its scene has drawn something."""
+        self.page.goto(url)
+        self.page.locator("#cover").wait_for(state="hidden")
+        self.until(lambda: any("/scene" in frame.url for frame in self.page.frames), "the scene")
+        self.scene.wait_for_function(DRAWN)
+
     @property
     def scene(self) -> Frame:
         """The document of the scene."""

@@ -18,18 +18,6 @@ def project(server: Any) -> str:
     return str(path)
 
 
-def follower(new_desk: Callable[..., Any], url: str) -> Any:
-    """A window that follows."""
-    desk = new_desk(1000, 700)
-    desk.page.goto(url)
-    desk.page.locator("#cover").wait_for(state="hidden")
-    desk.until(lambda: any("/scene" in frame.url for frame in desk.page.frames), "the scene")
-    desk.scene.wait_for_function(
-        "() => window.__viserMutable?.camera && '/first' in window.__viserMutable.nodeRefFromName"
-    )
-    return desk
-
-
 def test_own_views_shared_views_and_followed_views(new_desk: Callable[..., Any], server: Any, project: str) -> None:
     """Own views differ; a shared one is the same for both, also after a reload; who follows sees it and cannot act."""
     teacher, other = new_desk(), new_desk()
@@ -55,7 +43,8 @@ def test_own_views_shared_views_and_followed_views(new_desk: Callable[..., Any],
     teacher.wait_for_scene()
     teacher.until(lambda: teacher.selected == other.selected, "the shared view after a reload")
 
-    student = follower(new_desk, follow)
+    student = new_desk(1000, 700)
+    student.follow(follow)
     teacher.page.locator("#queue").focus()
     teacher.page.keyboard.press("1")
     student.until(lambda: student.page.locator("#what").inner_text().endswith("scans"), "the stage in words")
