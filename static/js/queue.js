@@ -139,6 +139,7 @@ export class Queue {
     byId("search").addEventListener("input", (event) => this.#find(event.target.value));
     byId("order").addEventListener("change", (event) => ((this.#order = event.target.value), this.refresh()));
     this.box.addEventListener("keydown", (event) => this.#key(event));
+    this.box.addEventListener("scroll", () => this.#mark(), { passive: true });
     this.box.addEventListener("click", (event) => {
       const row = event.target.closest("[role=option]");
       if (row) this.select(row.dataset.id);
@@ -200,12 +201,15 @@ export class Queue {
 
   #followed = null;
 
+  /** Mark the selected row; where it is scrolled out of sight it is not there to be pointed at. */
   #mark() {
+    let active = null;
     for (const element of this.list.canvas.children) {
       const selected = !element.hidden && element.dataset.id === this.view.integration;
       set(element, "aria-selected", String(selected));
-      if (selected) this.box.setAttribute("aria-activedescendant", element.id);
+      if (selected) active = element.id;
     }
+    set(this.box, "aria-activedescendant", active);
   }
 
   #draw(element, row) {

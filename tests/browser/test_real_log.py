@@ -34,7 +34,7 @@ def test_a_real_log_from_drop_to_report(
     page.locator(".item").first.wait_for()
     path = page.evaluate("location.pathname")
     page.locator("#rename").click()
-    page.get_by_role("textbox", name="Name").fill("Intel, first floor")
+    page.get_by_role("textbox", name="Name", exact=True).fill("Intel, first floor")
     page.keyboard.press("Enter")
     desk.until(lambda: page.locator("#name").inner_text() == "Intel, first floor", "the new name")
     server.wait_until_matched(path)
