@@ -58,6 +58,28 @@ def wall(desk: Any, server: Any, project: str) -> list[float]:
     return max(walls, key=lambda w: (w[2] - w[0]) ** 2 + (w[3] - w[1]) ** 2)
 
 
+def edge(desk: Any, server: Any, project: str) -> tuple[str, tuple[float, float]]:
+    """A long line between two scans of the largest component, and its middle; a pair of it is selected meanwhile."""
+    told = httpx.get(f"{server.url}/api{project}/export/tum").raise_for_status().text.splitlines()
+    poses = [[float(number) for number in line.split()[:3]] for line in told if not line.startswith("#")]
+    part = max(server.get(f"/api{project}")["components"], key=lambda one: len(one["scans"]))
+    rows = server.get(f"/api{project}/integrations")["integrations"]
+    accepted = {row["id"] for row in rows if row["state"] == "accepted"}
+    places = dict(zip(sorted(part["scans"], key=lambda name: int(name[2:])), poses, strict=True))
+    lines = []
+    for pair in accepted:
+        a, b = pair.split("-")
+        if a in places and b in places:
+            (_, x1, y1), (_, x2, y2) = places[a], places[b]
+            lines.append(((x2 - x1) ** 2 + (y2 - y1) ** 2, pair, ((x1 + x2) / 2.0, (y1 + y2) / 2.0)))
+    (_, other, _), *_, (_, pair, middle) = sorted(lines)
+    desk.page.locator("#search").fill(other)
+    desk.row(other).click()
+    desk.until(lambda: snapshot(desk, server)["integration"] == other, "a pair of that component")
+    desk.page.locator("#search").fill("")
+    return pair, middle
+
+
 def click(desk: Any, x: float, y: float) -> None:
     """A click at a place of the map."""
     box = desk.page.locator("#scene").bounding_box()
@@ -98,6 +120,16 @@ def test_the_map(new_desk: Callable[..., Any], server: Any, request: pytest.Fixt
     desk.until(lambda: desk.nodes.get("/map/measure/line", {}).get("shown"), "the line in the scene")
     desk.picture(f"map-measured-{name}")
     page.locator("#map-measure").click()
+
+    pair, (x, y) = edge(desk, server, project)
+
+    def chosen() -> bool:
+        """Click until the camera has come to where that component is drawn."""
+        click(desk, x, y)
+        return desk.selected == pair
+
+    desk.until(chosen, "the integration whose line was clicked")
+    page.locator("#tab-map").click()
 
     page.locator("#map-compare").focus()
     desk.until(lambda: page.locator("#map-compare option").count() > 2, "the maps to compare with")
