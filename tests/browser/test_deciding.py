@@ -275,3 +275,33 @@ def test_the_queue_begins_at_its_top_and_foresees(desk: Any, server: Any) -> Non
     worst = max(rows, key=lambda row: row["contradicted"] or -1.0)
     desk.until(lambda: desk.page.locator(".item:not([hidden])").first.is_visible(), "the rows")
     desk.until(lambda: desk.row(worst["id"]).is_visible(), "the most contradicted")
+
+
+def test_a_server_killed_after_a_click_comes_back(desk: Any, server: Any) -> None:
+    """The decision is there, the scene stands where it stood, undo goes on; a new decision ends what can be redone."""
+    project = server.open_sample("hall")
+    server.wait_until_matched(project)
+    desk.open(server.url + project)
+    pair = desk.selected
+    desk.page.keyboard.press("y")
+    desk.until(lambda: desk.selected != pair, "the decision")
+    here, scene = desk.selected, desk.scene.url
+    server.kill()
+    desk.page.locator("#offline").wait_for()
+    server.start()
+    desk.page.locator("#offline").wait_for(state="hidden", timeout=60_000)
+    desk.until(lambda: any("/scene" in f.url and f.url != scene for f in desk.page.frames), "another scene")
+    desk.wait_for_scene()
+    desk.until(lambda: desk.selected == here and snapshot(desk, server)["integration"] == here, "the same pair")
+    pose = snapshot(desk, server)["pose"]
+    desk.until(lambda: desk.nodes["/second"]["at"][:2] == pytest.approx([pose["x"], pose["y"]], abs=1e-4), "its place")
+    assert decided(server, project, pair)["state"] == "accepted"
+    desk.page.locator("#queue").focus()
+    desk.page.keyboard.press("u")
+    desk.until(lambda: decided(server, project, pair)["state"] == "pending", "the undo after the restart")
+    assert desk.page.locator("#redo").is_enabled()
+    desk.until(lambda: desk.selected == pair, "the pair again")
+    desk.page.keyboard.press("x")
+    desk.until(lambda: decided(server, project, pair)["state"] == "rejected", "another decision")
+    desk.until(lambda: desk.page.locator("#redo").is_disabled(), "nothing to be redone")
+    desk.errors.clear()  # of the time without a server
