@@ -228,8 +228,10 @@ def serving(workspace: Path) -> Iterator[tuple[str, int]]:
         assert process.stderr is not None
         line = next(line for line in process.stderr if "segmap is at" in line)
         threading.Thread(target=lambda: [print(told, end="") for told in process.stderr or ()], daemon=True).start()
-        yield line.split()[3].rstrip("/"), process.pid
-        process.terminate()
+        try:
+            yield line.split()[3].rstrip("/"), process.pid
+        finally:
+            process.kill()
 
 
 def memory(pid: int, what: str) -> float:
@@ -290,7 +292,7 @@ def measured(workspace: Path, given: argparse.Namespace) -> bool:
         opened = memory(pid, "VmRSS")
         started, used = time.monotonic(), cpu(pid)
         asyncio.run(crowd(url, small, given, times))
-        share = (cpu(pid) - used) / (time.monotonic() - started)
+        spent, passed = cpu(pid) - used, time.monotonic() - started
         most = memory(pid, "VmHWM")
     kinds = ("request", "count", "median ms", "95 % ms", "99 % ms", "most ms", "below 1 s %", "KiB", "failed")
     every = times.all
@@ -298,7 +300,7 @@ def measured(workspace: Path, given: argparse.Namespace) -> bool:
     print(
         f"\nlist of {len(small) + 1} projects for the first time {first:.2f} s, the large one opened in {large:.2f} s;"
         f" memory {before:.0f} MiB at the start, {opened:.0f} with the large project open, {most:.0f} at the most;"
-        f" {share:.2f} processors used"
+        f" {spent:.0f} s of processor time in {passed:.0f} s, {1000 * spent / len(every):.0f} ms a request"
     )
     return _quantile(every, 0.95) < BOUND and most < GIBIBYTES * 1024 and not sum(times.failed.values())
 

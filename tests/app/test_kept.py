@@ -1,0 +1,109 @@
+"""What is kept so that many can ask is what would be made anew."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import random
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.errors import UnknownError
+from app.pairs import Pairs, integrations_of
+from app.routes.files import _Files
+from app.schemas import Integration
+from app.session import Session
+from segmap.errors import ProjectError
+from segmap.events import Proposal
+
+
+def test_the_text_of_the_queue_is_the_queue(session: Session) -> None:
+    """After any steps: the rows in their order, of which each is as its schema says; another tag for another text."""
+    chance, tags = random.Random(3), dict[str, bytes]()
+    for _ in range(25):
+        id = chance.choice(session.integrations)
+        step = chance.choice(("accepted", "rejected", "clear", "undo", "redo", "propose", "threshold"))
+        try:
+            if step == "propose":
+                session.propose(
+                    [Proposal(integration=f"0.{chance.randrange(3)}-0.{chance.randrange(4, 7)}", kind="manual")]
+                )
+            elif step == "threshold":
+                session.set_parameters({"confidence_accept": chance.choice((0.7, 0.9, 0.99))})
+            elif step == "clear":
+                session.clear([id])
+            elif step in ("undo", "redo"):
+                getattr(session, step)()
+            else:
+                session.decide([id], step)
+        except ProjectError:
+            continue
+        text = session.queue_text()
+        assert json.loads(text.plain)["integrations"] == [Integration.of(row).model_dump() for row in session.rows()]
+        assert gzip.decompress(text.packed) == text.plain
+        assert tags.setdefault(text.tag, text.plain) == text.plain
+        assert session.integrations == integrations_of(session.state, session.scan_ids)
+    assert len(tags) > 5
+    assert session.queue_text() is session.queue_text()
+
+
+def test_pairs_are_made_again_where_there_are_others(session: Session) -> None:
+    """Decisions on neighbours leave the very list that there was; a proposal, an undo and a log make another."""
+    pairs, state, scans = Pairs(), session.state, session.scan_ids
+    first = pairs.of(state, scans)
+    session.decide(["0.0-0.1"], "rejected")
+    assert pairs.of(session.state, scans) is first
+    session.propose([Proposal(integration="0.0-0.4", kind="manual")])
+    assert pairs.of(session.state, scans) == integrations_of(session.state, scans) != first
+    session.undo()
+    assert pairs.of(session.state, scans) == first
+    assert pairs.of(session.state, scans[:4]) == integrations_of(session.state, scans[:4])
+
+
+def test_a_queue_that_is_the_same_is_not_sent_again(client: Any, project: str) -> None:
+    """Asked with its tag; after a decision it is another one. Who takes gzip gets it."""
+    url = f"/api/projects/{project}/integrations"
+    answer = client.get(url)
+    tag = answer.headers["etag"]
+    assert answer.headers["content-encoding"] == "gzip"
+    assert client.get(url, headers={"if-none-match": tag}).status_code == 304
+    plain = client.get(url, headers={"accept-encoding": "identity"})
+    assert "content-encoding" not in plain.headers
+    assert plain.json() == answer.json()
+    body = {"integrations": ["0.0-0.1"], "verdict": "rejected"}
+    assert client.post(f"/api/projects/{project}/decisions", json=body).status_code == 200
+    again = client.get(url, headers={"if-none-match": tag})
+    assert (again.status_code, again.headers["etag"] != tag) == (200, True)
+
+
+def test_files_of_the_pages(tmp_path: Path) -> None:
+    """As they are now, by name: new, changed and gone ones too; nothing that is no file below the folder."""
+    folder = tmp_path / "static"
+    (folder / "js").mkdir(parents=True)
+    (folder / "js" / "a.js").write_text("1")
+    (tmp_path / "secret").write_text("x")
+    files = _Files(folder)
+    first = files.get("js/a.js")
+    assert (first.content, first.kind) == (b"1", "text/javascript")
+    assert files.get("js/a.js") is first
+    (folder / "js" / "a.js").write_text("2")
+    os.utime(folder / "js" / "a.js", ns=(1, 1))
+    assert files.get("js/a.js").content == b"2"
+    assert files.get("js/a.js").tag != first.tag
+    (folder / "new.css").write_text("b {}")
+    assert files.get("new.css").kind == "text/css"
+    (folder / "js" / "a.js").unlink()
+    for name in ("js/a.js", "js", "", "../secret", "js/../../secret", "/etc/passwd", "a\0b", str(tmp_path / "secret")):
+        with pytest.raises(UnknownError):
+            files.get(name)
+
+
+def test_files_are_asked_for_again_and_not_sent(client: Any) -> None:
+    """A browser that has a file hears that it is the same."""
+    answer = client.get("/static/js/api.js")
+    assert answer.headers["cache-control"] == "no-cache"
+    assert client.get("/static/js/api.js", headers={"if-none-match": answer.headers["etag"]}).status_code == 304
+    assert client.request("HEAD", "/static/js/api.js").status_code == 200
