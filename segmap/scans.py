@@ -84,7 +84,11 @@ class LaserScan:
         if self.angle_step == 0.0 and len(ranges) > 1:
             raise ScanError("The angle step of a scan must not be 0.")
         with np.errstate(invalid="ignore"):
-            ranges[~(np.isfinite(ranges) & (ranges > 0.0) & (ranges < min(self.max_range, FARTHEST)))] = np.nan
+            wrong = ~(
+                np.isfinite(ranges) & (ranges > 0.0) & (ranges < min(self.max_range, FARTHEST)) | np.isnan(ranges)
+            )
+        if wrong.any():
+            ranges = np.where(wrong, np.nan, ranges)
         ranges.flags.writeable = False
         object.__setattr__(self, "ranges", ranges)
 
@@ -114,8 +118,10 @@ class LaserScan:
 
 
 def _checked_ranges(ranges: ArrayLike) -> FloatArray:
+    """A row of its own; one that nobody can write to is taken as it is."""
+    fixed = isinstance(ranges, np.ndarray) and ranges.dtype == np.float64 and not ranges.flags.writeable
     try:
-        array = np.array(ranges, dtype=np.float64)
+        array: FloatArray = np.asarray(ranges) if fixed else np.array(ranges, dtype=np.float64)
     except (TypeError, ValueError):
         raise ScanError("The ranges of a scan must be one row of numbers.") from None
     if array.ndim != 1:

@@ -6,7 +6,7 @@ To add a format, write a module with a :class:`~segmap.logs.records.Format` and 
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 
 import numpy as np
@@ -23,6 +23,7 @@ from segmap.logs.records import Format, Problems, Record
 from segmap.logs.rosbag1 import ROS_1_BAG
 from segmap.logs.rosbag2 import ROS_2_BAG
 from segmap.logs.segment_maps import MapPart, MapsFile, holds_maps, is_maps, read_maps
+from segmap.logs.shelf import Shelf
 from segmap.logs.source import ANY_SIZE, Limits, LogFile, LogSource, bag_in, base_name, name_of
 from segmap.logs.text import printable, shown
 from segmap.scans import LaserLog, LaserScan
@@ -114,35 +115,43 @@ def read_logs(source: LogSource, name: str | None = None, limits: Limits | None 
             return (_empty(file, Problems()),)
         format = _format_of(head, file)
         problems = Problems(unit=format.unit)
-        records = list(islice(format.records(file, problems), file.limits.scans + 1))
+        shelf = Shelf()
+        records = [shelf.put(record) for record in islice(format.records(file, problems), file.limits.scans + 1)]
         if len(records) > file.limits.scans:
             raise LogError(f"{file.name} holds more than {file.limits.scans} scans: split it and read each part.")
+        records = format.chosen(records)
         if file.damage:
             problems.add(_last_line(records), _damage(file, format))
     if not records:
-        return (_log(file.name, format, records, problems),)
+        return (_log(file.name, format, records, problems, shelf),)
     by_topic: dict[str, list[Record]] = defaultdict(list)
     for record in _spent(records):
         by_topic[record.sensor if format.topics else ""].append(record)
-    return _logs(file.name, format, by_topic, problems)
+    return _logs(file.name, format, by_topic, problems, shelf)
 
 
-def _logs(name: str, format: Format, by_topic: Mapping[str, list[Record]], problems: Problems) -> tuple[LaserLog, ...]:
+def _logs(
+    name: str, format: Format, by_topic: Mapping[str, list[Record]], problems: Problems, shelf: Shelf
+) -> tuple[LaserLog, ...]:
     """A log for each topic; what concerns the file is told with the first one."""
     logs = []
     for topic, records in by_topic.items():
         called = name if len(by_topic) == 1 else f"{name} {topic.strip('/').replace('/', '.')}"
-        logs.append(_log(called, format, records, problems, topic))
+        logs.append(_log(called, format, records, problems, shelf, topic))
         problems = Problems(unit=format.unit)
     return tuple(logs)
 
 
-def _log(name: str, format: Format, records: list[Record], problems: Problems, topic: str = "") -> LaserLog:
+def _log(
+    name: str, format: Format, records: list[Record], problems: Problems, shelf: Shelf, topic: str = ""
+) -> LaserLog:
     """The log of some records, which are let go one by one."""
-    _check_unit(records, problems)
+    _check_unit(records, problems, shelf)
     silence = _silence(records)
+    shelf.rest()
     no_return = _main(records, silence)
-    scans = _scans(records, silence, problems)
+    scans = _scans(shelf.passing(_spent(records)), silence, problems)
+    shelf.rest()
     if not scans:
         problems.add(1, f"{name} is a {format.name} log without laser scans: choose a log that has some")
     return LaserLog(name, scans, format.name, no_return, problems.all(), topic)
@@ -202,10 +211,10 @@ def _damage(file: LogFile, format: Format) -> str:
     )
 
 
-def _check_unit(records: Sequence[Record], problems: Problems) -> None:
+def _check_unit(records: Sequence[Record], problems: Problems, shelf: Shelf) -> None:
     """Ranges in millimetres would pass for walls hundreds of metres away."""
     readings = sum(len(record.ranges) for record in records)
-    far = sum(int(np.count_nonzero(record.ranges > FAR)) for record in records)
+    far = sum(int(np.count_nonzero(record.ranges > FAR)) for record in shelf.passing(records))
     if 2 * far > readings:
         problems.add(records[0].line, f"most readings of this log are above {FAR:g}: convert them to metres")
 
@@ -235,10 +244,10 @@ def _main(records: Sequence[Record], silence: Mapping[tuple[str, int], NoReturn]
 
 
 def _scans(
-    records: list[Record], silence: Mapping[tuple[str, int], NoReturn], problems: Problems
+    records: Iterable[Record], silence: Mapping[tuple[str, int], NoReturn], problems: Problems
 ) -> tuple[LaserScan, ...]:
     scans = []
-    for record in _spent(records):
+    for record in records:
         try:
             scans.append(_scan(record, silence[_laser(record)].limit))
         except ScanError as error:
@@ -247,14 +256,9 @@ def _scans(
 
 
 def _scan(record: Record, limit: float) -> LaserScan:
+    """The scan of a record, whose readings it takes over."""
+    ranges = record.ranges if record.ranges.flags.writeable else record.ranges.copy()
     with np.errstate(invalid="ignore"):
-        possible = (record.ranges > SHORTEST) & (record.ranges < LONGEST)
-    return LaserScan(
-        np.where(possible, record.ranges, np.nan),
-        record.first_angle,
-        record.angle_step,
-        limit,
-        record.time,
-        record.pose,
-        record.line,
-    )
+        ranges[~((ranges > SHORTEST) & (ranges < min(limit, LONGEST)))] = np.nan
+    ranges.flags.writeable = False
+    return LaserScan(ranges, record.first_angle, record.angle_step, limit, record.time, record.pose, record.line)

@@ -16,9 +16,8 @@ both writes each sweep twice, raw and with the robot's pose.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from itertools import islice
 
 from segmap.logs.records import Format, Problems, Record, half_turn
 from segmap.logs.source import LogFile
@@ -116,10 +115,13 @@ PARSERS: dict[bytes, Parser] = {
 }
 
 
-def _records(file: LogFile, problems: Problems) -> list[Record]:
-    records = list(islice(records_of(file, problems, PARSERS, KNOWN), file.limits.scans + 1))
-    with_pose = [record for record in records if not record.sensor.startswith("RAWLASER")]
-    return with_pose or records
+def _records(file: LogFile, problems: Problems) -> Iterator[Record]:
+    return records_of(file, problems, PARSERS, KNOWN)
+
+
+def _chosen(records: list[Record]) -> list[Record]:
+    """Newer logs hold each scan twice: raw, and again with the robot's pose."""
+    return [record for record in records if not record.sensor.startswith("RAWLASER")] or records
 
 
 def _recognises(head: bytes) -> bool:
@@ -141,4 +143,5 @@ CARMEN = Format(
     expects="CARMEN (lines that start with FLASER, RLASER, ROBOTLASER1 or RAWLASER1)",
     recognises=_recognises,
     records=_records,
+    chosen=_chosen,
 )

@@ -84,6 +84,8 @@ class Format:
     """what its records are counted in, for messages"""
     topics: bool = False
     """whether each of its sensors is a log of its own, called by its topic"""
+    chosen: Callable[[list[Record]], list[Record]] = list
+    """those of all records that are scans of their own"""
 
 
 def too_many(beams: int) -> str | None:

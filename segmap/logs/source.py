@@ -52,7 +52,7 @@ class Limits:
     """of reading; 256 MiB take less than a minute"""
 
 
-ANY_SIZE = Limits(size=1 << 50, lines=1 << 40, seconds=math.inf)
+ANY_SIZE = Limits(size=1 << 50, lines=1 << 40, scans=1 << 40, seconds=math.inf)
 """for files of one's own; what grows beyond measure when decompressed is refused all the same"""
 
 
