@@ -28,8 +28,16 @@ __all__ = ["PARAMETER", "VARIABLE", "Access", "is_loopback", "token_for"]
 VARIABLE = "SEGMAP_TOKEN"
 """the environment variable that gives a token of one's own, the same after every start"""
 PARAMETER = "token"
-OPEN = ("/follow/", "/static/")
-"""where nothing is asked: who follows a view is known by the name in the address, and may only look; our own scripts"""
+FOLLOWING = "/follow/"
+"""where nothing is asked: who follows a view is known by the name in the address, and may only look"""
+FILES = frozenset(
+    f"/static/{name}"
+    for name in (
+        *("favicon.svg", "icons.svg", "css/base.css", "css/project.css"),
+        *(f"js/{name}.js" for name in ("follow", "api", "dom", "format", "stream")),
+    )
+)
+"""what the page of who follows is made of"""
 SHORTEST = 16
 DAYS = 30
 MISSING = "This server asks for the link that it printed when it was started: open that link, or ask who started it."
@@ -71,7 +79,7 @@ class Access:
 
     def refusal(self, scope: Scope, headers: Headers) -> Response | None:
         """What to answer instead of the request: a redirection for who brings the link, 401 for who brings nothing."""
-        if self._token is None or self._admitted(headers) or scope["path"].startswith(OPEN):
+        if self._token is None or _is_open(scope["path"]) or self._admitted(headers):
             return None
         if scope["type"] == "http" and scope["method"] in ("GET", "HEAD") and self._is_token(_in_link(scope)):
             return self._welcome(scope, headers)
@@ -103,6 +111,10 @@ class Access:
             samesite="lax",  # strict would not come along when the link was followed from somebody's mail
         )
         return answer
+
+
+def _is_open(path: str) -> bool:
+    return path.startswith(FOLLOWING) or path in FILES
 
 
 def _cookie_name(headers: Headers) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -83,7 +84,12 @@ def test_following_needs_no_other_pass(make_client: Callable[..., Any], log_byte
     follow = client.post(f"/api/views/{view}/share", headers=key).json()["follow"]
     assert client.get(follow).status_code == 200
     assert client.get(f"{follow}/view").status_code == 200
-    assert client.get("/static/js/follow.js").status_code == 200
+    needed, page = ["/static/js/follow.js"], client.get(follow).text
+    needed += re.findall(r'(?:href|src)="(/static/[^"#]+)', page)
+    while needed:
+        file = client.get(needed[0])
+        assert file.status_code == 200, needed[0]
+        needed = needed[1:] + [f"/static/js/{name}" for name in re.findall(r'from "\./(.+?)"', file.text)]
     for closed in (
         "/",
         "/api/projects",
