@@ -35,10 +35,10 @@ def _with(name: str, kind: type[str] | type[int]) -> Callable[[View, Any], None]
 def _decision(name: str) -> Callable[[View, Any], None]:
     def action(view: View, value: Any) -> None:
         told = value if isinstance(value, dict) else {"integration": value}
-        meant, revision = told.get("integration"), told.get("revision")
-        if not (isinstance(meant, str | None) and _is_whole(revision, optional=True)):
+        meant, revision, who = told.get("integration"), told.get("revision"), told.get("who")
+        if not (isinstance(meant, str | None) and _is_whole(revision, optional=True) and isinstance(who, str | None)):
             raise RequestError(f"The action {name} takes the integration that is meant as its value, or none.")
-        getattr(view, name)(meant, revision)
+        getattr(view, name)(meant, revision, None if who is None else who[:255])
 
     return action
 
@@ -50,9 +50,10 @@ def _is_whole(value: Any, optional: bool = False) -> bool:
 def _decide_many(view: View, value: Any) -> None:
     told = value if isinstance(value, dict) else {}
     ids, verdict, revision = told.get("integrations"), told.get("verdict"), told.get("revision")
-    if not _are_texts(ids) or not isinstance(verdict, str) or not _is_whole(revision, optional=True):
+    who, known = told.get("who"), _are_texts(ids) and isinstance(verdict, str)
+    if not known or not _is_whole(revision, optional=True) or not isinstance(who, str | None):
         raise RequestError("The action decide_many takes {integrations, verdict} as its value.")
-    view.decide_many(ids, verdict, revision)
+    view.decide_many(list(ids or ()), str(verdict), revision, None if who is None else who[:255])
 
 
 def _set_order(view: View, value: Any) -> None:

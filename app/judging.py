@@ -80,25 +80,28 @@ class Judging(ABC):
         with self._acting:
             self._look(replace(self._looks, reason=reason[:10_000]))
 
-    def accept(self, integration: str | None = None, revision: int | None = None) -> None:
+    def accept(self, integration: str | None = None, revision: int | None = None, who: str | None = None) -> None:
         """Accept the candidate shown and go on to the next pending integration.
 
         With ``integration``, only if that is the one looked at: so that a late click decides nothing else.
-        ``revision`` is the one the person saw; default: the one this view has told of last.
+        ``revision`` is the one the person saw; default: the one this view has told of last. ``who`` they are, where
+        several work in one view; default: whoever said so last.
 
         Raises:
             ConflictError: somebody else decided on it since; the second of two decisions is told so.
         """
-        self._decide("accepted", integration, revision)
+        self._decide("accepted", integration, revision, who)
 
-    def reject(self, integration: str | None = None, revision: int | None = None) -> None:
+    def reject(self, integration: str | None = None, revision: int | None = None, who: str | None = None) -> None:
         """Reject the integration and go on to the next pending one; the rest as for :meth:`accept`."""
-        self._decide("rejected", integration, revision)
+        self._decide("rejected", integration, revision, who)
 
-    def decide_many(self, integrations: Sequence[str], verdict: str, revision: int | None = None) -> None:
+    def decide_many(
+        self, integrations: Sequence[str], verdict: str, revision: int | None = None, who: str | None = None
+    ) -> None:
         """Accept or reject the best candidates of many, or make them undecided again: one step, one undo."""
         with self._acting:
-            told: dict[str, Any] = {"who": self.who, "expected_revision": revision}
+            told: dict[str, Any] = {"who": self.who if who is None else who, "expected_revision": revision}
             with self._stepping():
                 if verdict == "undecided":
                     change = self.session.clear(integrations, **told)
@@ -124,7 +127,7 @@ class Judging(ABC):
         """Do again what was undone, and look at what it is about."""
         self._turn_back(self.session.redo, self.session.state.can_redo, "Redone")
 
-    def _decide(self, verdict: str, integration: str | None, revision: int | None) -> None:
+    def _decide(self, verdict: str, integration: str | None, revision: int | None, who: str | None) -> None:
         with self._acting:
             if self._late(integration):
                 return
@@ -145,7 +148,7 @@ class Judging(ABC):
                     candidate=self._rank() if self._count() else None,
                     heuristic=self._evidence.heuristic(looks),
                     reason=looks.reason,
-                    who=self.who,
+                    who=self.who if who is None else who,
                     expected_revision=self._seen if revision is None else revision,
                 )
             self._decided_at = self._clock()

@@ -1,8 +1,12 @@
 // This page's view: what its scene shows. The server keeps it; the page asks for changes and mirrors the answer.
 
 import { get, post } from "./api.js";
+import { byId } from "./dom.js";
 
 const SETTLE = 30;
+
+/** Who decides at this page: several may work in one view. */
+const name = () => byId("who").value.trim();
 
 /** Tells "opened" (there is a new scene) and "changed" (the snapshot) as events. */
 export class View extends EventTarget {
@@ -59,13 +63,13 @@ export class View extends EventTarget {
   /** Accept or reject what is shown here; the server tells where somebody has decided on it since. */
   decide(verdict) {
     const { integration, revision } = this.snapshot;
-    return this.act(verdict, { integration, revision });
+    return this.act(verdict, { integration, revision, who: name() });
   }
 
   /** Decide many in one step, on the best candidates of each; where there is no view, the project does it. */
   decideMany(integrations, verdict) {
     if (this.id === null) return this.project.decide(integrations, verdict);
-    return this.act("decide_many", { integrations, verdict, revision: this.project.info.revision });
+    return this.act("decide_many", { integrations, verdict, revision: this.project.info.revision, who: name() });
   }
 
   /** Select an integration: shown at once; of many quick selections only the last is sent, and only its answer counts. */

@@ -63,6 +63,9 @@ def test_who_and_why_go_with_the_decision_and_the_next_has_no_reason(view: View,
         session.match(pair).candidates,  # type: ignore[union-attr]
     )
     assert (shown["who"], shown["reason"]) == ("Ann", "")
+    other = here(view)
+    view.act("reject", {"integration": other, "who": "Bob"})
+    assert session.state.decisions[other].who == "Bob"
 
 
 def test_verified_grounds_are_the_match_s(session: Session) -> None:
@@ -174,6 +177,7 @@ def test_steps_follow_what_the_page_lists(view: View, session: Session, clock: C
     [
         ("accept", {"integration": 3}),
         ("accept", {"integration": "0.0-0.1", "revision": "2"}),
+        ("accept", {"integration": "0.0-0.1", "who": 2}),
         ("decide_many", ["0.0-0.1"]),
         ("decide_many", {"integrations": ["0.0-0.1"], "verdict": "maybe"}),
         ("decide_many", {"integrations": [1], "verdict": "accepted"}),

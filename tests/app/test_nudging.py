@@ -6,6 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,6 +20,7 @@ from app.workbench import View
 from segmap.errors import MapError
 from segmap.evaluation import matching_values
 from segmap.events import IntegrationId
+from segmap.integration import match_maps
 from segmap.placing import REACH
 from segmap.pose import Pose2
 
@@ -168,6 +170,32 @@ def test_what_is_proposed_anew_keeps_what_was_laid_by_hand(client: Any, project:
     assert session.state.proposals["0.1-0.2"].nudge == held
     assert session.state.proposals["0.1-0.2"].T_1_2 == AWAY
     assert [c.index for c in session.match("0.1-0.2").ranked[-2:]] == [-1, -2]
+
+
+def test_where_nothing_is_found_a_person_can_lay_it(open_session: Callable[..., Session]) -> None:
+    """Beside each other they stand until they are laid; then there is a candidate, which can be accepted."""
+
+    def nothing(*maps: Any, **options: Any) -> Any:
+        return replace(match_maps(*maps, **options), ranked=(), chains=())
+
+    session = open_session(find=nothing)
+    assert session.settle(PATIENCE)
+    view = View(session)
+    try:
+        pair = here(view)
+        assert (session.row(pair).state, view.snapshot()["candidates"]) == ("none", 0)
+        view.set_nudging(True)
+        view.hold(Pose2(0.1, 0.0, 0.0))
+        assert view.snapshot()["held"]
+        assert view.picture().drawables
+        view.let_go()
+        shown = view.snapshot()
+        assert (shown["candidates"], shown["candidate"], shown["origin"]) == (1, 0, "nudged")
+        view.accept()
+        assert session.state.decisions[pair].origin == "nudged"
+        assert session.row(pair).state == "accepted"
+    finally:
+        view.close()
 
 
 @pytest.mark.parametrize(
