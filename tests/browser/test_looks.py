@@ -179,3 +179,23 @@ def test_states(desk: Any, server: Any, project: str) -> None:
     assert complaints(page) == []
     desk.picture("looks-failed")
     desk.errors.clear()
+
+
+def test_walkthrough_page(new_desk: Callable[..., Any], server: Any) -> None:
+    """The player, a stop of the lesson and the race have nothing serious against them, and are whole at every size."""
+    desk = new_desk(1440, 900)
+    page = desk.page
+    page.goto(f"{server.url}/walk?sample=laboratory&heuristic=consecutive&stage=evaluation&step=3&lesson=4")
+    page.locator(".say:not(:empty)").wait_for()
+    page.locator("#lesson h2").wait_for()
+    for scheme in ("light", "dark"):
+        calm(page, scheme)
+        assert complaints(page, scheme) == []
+    page.locator("#races-open").click()
+    page.locator(".races tbody tr").nth(15).wait_for()
+    assert complaints(page, scheme) == []
+    page.locator(".races").get_by_role("button", name="Close").click()
+    for width, height in SIZES:
+        page.set_viewport_size({"width": width, "height": height})
+        assert page.evaluate(CLIPPED) == [], (width, height)
+        desk.picture(f"looks-walk-{width}")

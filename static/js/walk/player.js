@@ -193,7 +193,7 @@ function parts(player) {
     title: h("h2"), about: h("p.about"), paper: h("p.paper"),
     say: h("p.say", { role: "status", "aria-live": "polite" }),
     quantities: h("dl.quantities", { "aria-label": "Quantities of this line" }),
-    algorithm: h("h3"), lines: h("ol.lines", { "aria-label": "Lines of the algorithm" }),
+    algorithm: h("h3"), lines: h("ol.lines", { "aria-label": "Lines of the algorithm", tabindex: 0 }),
     charts: h("div.charts"), count: h("span.number.count"),
     entered: h("button.enter", { type: "button", hidden: true, onclick: () => player.enter() }),
     back: button("◀", "One step back (left arrow)", () => (player.pause(), player.move(-1))),
