@@ -10,8 +10,9 @@ Timed in chromium, from the key or the slider until what it changes is there, `-
   has other segments and the page says what was tried;
 - queue: the page of a project with 2,000 integrations opened, until J selects another pair.
 
-Printed: medians, 95th percentiles, limits, and the load of the machine: on one that is busy with other things the
-numbers are inflated. The scene is drawn in software where there is no graphics card; frames are not waited for.
+Printed: medians, 95th percentiles, limits, and how busy the machine was: how much longer than its own CPU time a short
+loop took, before each step. Where that is far above 1 the times are inflated as much. The scene is drawn in software
+where there is no graphics card; frames are not waited for.
 """
 
 from __future__ import annotations
@@ -38,6 +39,10 @@ SCANS = 60
 """of the log that pairs are taken from"""
 LARGE = 2_001
 """scans of the project with the large queue"""
+LOOP = 0.03
+"""seconds"""
+NOISE: list[float] = []
+"""what the loop told before each step"""
 LIMITS = {"candidate": 100, "decision": 150, "decision, next pair": 150, "parameter": 300, "queue": 2000}
 """milliseconds"""
 READY = "() => window.__viserMutable?.nodeRefFromName?.['/second']"
@@ -147,8 +152,17 @@ def opened(browser: Browser, url: str) -> Page:
     return page
 
 
+def noise() -> float:
+    """How many times its own CPU time a loop of some milliseconds takes."""
+    wall, own = time.perf_counter(), time.process_time()
+    while (spent := time.process_time() - own) < LOOP:
+        pass
+    return (time.perf_counter() - wall) / spent
+
+
 def timed(page: Page, kind: str, key: object, id: str | None = None) -> list[float]:
     """Milliseconds of one step; a pause follows, as a person makes."""
+    NOISE.append(noise())
     times: list[float] = page.evaluate(TIMES, [kind, key, id])
     page.wait_for_timeout(600)
     if None in times:
@@ -185,6 +199,7 @@ def openings(browser: Browser, url: str, rounds: int) -> list[float]:
     """The page of the large project, opened afresh each time."""
     times = []
     for _ in range(rounds):
+        NOISE.append(noise())
         context = browser.new_context(viewport={"width": 1280, "height": 800})
         page = context.new_page()
         page.set_default_timeout(120_000)
@@ -236,6 +251,7 @@ def main() -> None:
     print(provenance())
     print(markdown(["ms", "median", "95 %", "limit", "times"], [row(name, times[name]) for name in LIMITS]))
     print(told)
+    print(f"busy: a loop took {median(NOISE):.1f} times its CPU time, 95 % {np.quantile(NOISE, 0.95):.1f} times")
 
 
 if __name__ == "__main__":
