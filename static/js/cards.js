@@ -14,7 +14,8 @@ export const placeholder = () => h("li.card.placeholder", { "aria-hidden": "true
 export function projectCard(project, changed) {
   const map = project.integrations.accepted ? `/api/projects/${encodeURIComponent(project.id)}/map.svg` : null;
   const title = h("h3", {}, project.problem ? project.name : h("a", { href: project.url }, project.name));
-  return h("li.card", {}, picture(map, "No map yet"), h("div.body", {}, title, project.problem ? h("p.trouble", {}, project.problem) : facts(project)), projectMenu(project, changed));
+  const told = project.problem ? h("p.trouble", {}, project.problem) : facts(project);
+  return h("li.card", {}, picture(map, "No map yet"), h("div.body", {}, title, told), projectMenu(project, changed));
 }
 
 function facts(project) {

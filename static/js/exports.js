@@ -2,19 +2,19 @@
 
 import { file, get } from "./api.js";
 import { byId, h } from "./dom.js";
-import { menu as asMenu } from "./menu.js";
+import { menu } from "./menu.js";
 import { failed, notice } from "./notices.js";
 
 /** Make the menu work for a project: every format the server writes, and what the page itself lists. */
 export async function exportMenu(project) {
-  const menu = asMenu(byId("export"));
-  menu.addEventListener("click", chosen);
+  const box = menu(byId("export"));
+  box.addEventListener("click", chosen);
   const point = (link) => (link.href = `${project.url}/${link.dataset.path}`);
-  menu.querySelectorAll("a").forEach(point);
+  box.querySelectorAll("a").forEach(point);
   try {
     const { formats } = await get("/api/exports");
-    menu.querySelector("ul").prepend(...formats.map(item));
-    menu.querySelectorAll("a").forEach(point);
+    box.querySelector("ul").prepend(...formats.map(item));
+    box.querySelectorAll("a").forEach(point);
   } catch (error) {
     failed(error);
   }

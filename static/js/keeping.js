@@ -68,7 +68,8 @@ export async function showDeleted(changed) {
 
 function deletedItem(project, changed) {
   const back = h("button", { type: "button", "aria-label": `Restore ${project.name}`, onclick: () => restore(project, changed).catch(failed) }, "Restore");
-  const gone = h("button.quiet", { type: "button", "aria-label": `Delete ${project.name} for good`, onclick: () => forGood(project, changed) }, "Delete for good…");
+  const ask = { type: "button", "aria-label": `Delete ${project.name} for good`, onclick: () => forGood(project, changed) };
+  const gone = h("button.quiet", ask, "Delete for good…");
   return h("li", {}, h("span", {}, project.name), project.modified ? h("span.muted", {}, `changed ${ago(project.modified)}`) : null, back, gone);
 }
 

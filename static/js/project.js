@@ -95,7 +95,8 @@ function gone(stream) {
   view.forget();
   cover("");
   const back = h("button.primary", { type: "button", onclick: () => restore(project, () => location.reload()).catch(failed) }, "Restore it");
-  const message = h("div.message.error", { role: "alert" }, h("p", {}, "This project was deleted."), h("div.row", {}, back, h("a.button", { href: "/" }, "All projects")));
+  const ways = h("div.row", {}, back, h("a.button", { href: "/" }, "All projects"));
+  const message = h("div.message.error", { role: "alert" }, h("p", {}, "This project was deleted."), ways);
   byId("workbench").replaceChildren(h("div.unavailable", {}, message));
 }
 

@@ -7,6 +7,7 @@ import sqlite3
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 
 pytestmark = pytest.mark.browser
@@ -102,12 +103,13 @@ def test_deleted_under_ones_eyes(new_desk: Any, server: Any) -> None:
     """Whoever looks at a project that another person deletes is told, and can have it back."""
     desk, other = new_desk(), new_desk()
     url = server.open_sample("hall")
+    httpx.patch(f"{server.url}/api{url}", json={"name": "For a moment"}).raise_for_status()
     server.wait_until_matched(url)
     desk.open(server.url + url)
     other.page.goto(server.url)
-    choose(other, "A hall with long walls", "Delete")
+    choose(other, "For a moment", "Delete")
     desk.page.get_by_text("This project was deleted").wait_for()
     desk.picture("project-deleted")
     desk.page.get_by_role("button", name="Restore it").click()
     desk.page.locator(".item").first.wait_for()
-    assert server.get(f"/api{url}")["name"] == "A hall with long walls"
+    assert server.get(f"/api{url}")["name"] == "For a moment"
