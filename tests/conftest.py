@@ -27,6 +27,22 @@ ARGUMENTS = (
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """``--all``: also what takes longer than a moment."""
+    parser.addoption("--all", action="store_true", help="run the slow tests too, and all that drive the real page")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Without ``--all`` one walk through the real page is enough, and what is slow waits."""
+    if config.getoption("--all"):
+        return
+    for item in items:
+        if item.get_closest_marker("slow"):
+            item.add_marker(pytest.mark.skip(reason="slow: pytest --all runs it"))
+        elif item.get_closest_marker("browser") and not item.get_closest_marker("quick"):
+            item.add_marker(pytest.mark.skip(reason="one browser test is enough for now: pytest --all runs the others"))
+
+
 def _folder(variable: str, name: str, what: str) -> Path:
     folder = Path(os.environ.get(variable, SHARED / name))
     if not folder.is_dir():
