@@ -62,8 +62,13 @@ class Evidence:
 def _grounds_of_best(outcome: Outcome, parameters: Parameters) -> Grounds:
     found = outcome.findings
     seen = asdict(found.evidence) if found and found.evidence else {}
-    told = {"verdict": str(outcome.verdict(parameters)), "confidence": outcome.confidence}
-    return Grounds(**told, score=found.score if found else None, **seen, candidates=outcome.candidates)
+    return Grounds(
+        verdict=str(outcome.verdict(parameters)),
+        confidence=outcome.confidence,
+        score=found.score if found else None,
+        **seen,
+        candidates=outcome.candidates,
+    )
 
 
 def _grounds(candidate: Candidate, match: Match) -> Grounds:

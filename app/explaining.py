@@ -63,11 +63,11 @@ def _conflicts(sights: tuple[MapSight, MapSight] | None) -> list[dict[str, Any]]
     """The segments whose returns the other scan's lines of sight deny, the worst first."""
     if sights is None:
         return []
-    found = [
+    found: list[dict[str, Any]] = [
         {"source": source, "segment": term.segment, "contradicted": term.evidence.contradicted, "score": term.score}
         for source, side in zip(("first", "second"), sights, strict=True)
         for term in side.segments
         if term.evidence.contradicted > 0.0
     ]
-    order = np.argsort([-float(one["contradicted"]) for one in found], kind="stable")
+    order = np.argsort([-one["contradicted"] for one in found], kind="stable")
     return [found[k] for k in order]

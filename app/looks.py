@@ -72,10 +72,10 @@ class Looks:
 
     def at(self, integration: str | None, heuristic: str | None = None, rank: int = 0) -> Looks:
         """The same view of another integration, or of another candidate of it."""
-        blank = {"picked": None, "notice": "", "held": None, "laying": (), "trial": None, "measured": ()}
-        if integration != self.integration:
-            blank |= {"nudging": False, "reason": ""}
-        return replace(self, integration=integration, heuristic=heuristic, rank=rank, **blank)
+        same = integration == self.integration
+        blank = replace(self, picked=None, notice="", held=None, laying=(), trial=None, measured=())
+        kept = blank if same else replace(blank, nudging=False, reason="")
+        return replace(kept, integration=integration, heuristic=heuristic, rank=rank)
 
     def switch(self, layer: str, on: bool) -> Looks:
         """With a layer of this stage drawn or not."""

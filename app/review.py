@@ -244,6 +244,7 @@ def _undecided(blank: Row, outcome: Outcome | None, parameters: Parameters) -> R
     if outcome.failure:
         return replace(blank, state="failed", reason=outcome.failure)
     verdict, found = outcome.verdict(parameters), outcome.findings
+    seen = found.evidence if found else None
     return replace(
         blank,
         state="none" if outcome.pose is None else "pending",
@@ -252,8 +253,8 @@ def _undecided(blank: Row, outcome: Outcome | None, parameters: Parameters) -> R
         above=verdict is Verdict.ACCEPTED,
         confidence=outcome.confidence,
         score=found.score if found else None,
-        supported=found.evidence.supported if found else None,
-        contradicted=found.evidence.contradicted if found else None,
+        supported=seen.supported if seen else None,
+        contradicted=seen.contradicted if seen else None,
         candidates=outcome.candidates,
         milliseconds=outcome.milliseconds,
     )
