@@ -114,7 +114,8 @@ class Browser:
         )
         shown = [held for held in listed.json()["projects"] if held["integrations"]["accepted"]][:12]
         for held in shown:
-            await self.request("picture", "GET", f"/api/projects/{held['id']}/map.svg")
+            answer = await self.request("picture", "GET", f"/api/projects/{held['id']}/map.svg")
+            self.times.failed["picture"] -= answer.status_code == 404  # not drawn yet
 
     async def page(self, path: str) -> None:
         """A page, its styles and its modules."""
