@@ -139,7 +139,7 @@ export class Queue {
     byId("search").addEventListener("input", (event) => this.#find(event.target.value));
     byId("order").addEventListener("change", (event) => ((this.#order = event.target.value), this.refresh()));
     this.box.addEventListener("keydown", (event) => this.#key(event));
-    this.box.addEventListener("scroll", () => this.#mark(), { passive: true });
+    this.box.addEventListener("scroll", () => this.#point(), { passive: true });
     this.box.addEventListener("click", (event) => {
       const row = event.target.closest("[role=option]");
       if (row) this.select(row.dataset.id);
@@ -201,15 +201,18 @@ export class Queue {
 
   #followed = null;
 
-  /** Mark the selected row; where it is scrolled out of sight it is not there to be pointed at. */
   #mark() {
-    let active = null;
     for (const element of this.list.canvas.children) {
-      const selected = !element.hidden && element.dataset.id === this.view.integration;
-      set(element, "aria-selected", String(selected));
-      if (selected) active = element.id;
+      set(element, "aria-selected", String(!element.hidden && element.dataset.id === this.view.integration));
     }
-    set(this.box, "aria-activedescendant", active);
+    this.#point();
+  }
+
+  /** Point at the selected row; where it is scrolled out of sight it is not there to be pointed at. */
+  #point() {
+    const rows = [...this.list.canvas.children];
+    const active = rows.find((element) => !element.hidden && element.dataset.id === this.view.integration);
+    set(this.box, "aria-activedescendant", active?.id ?? null);
   }
 
   #draw(element, row) {
