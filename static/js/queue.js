@@ -177,6 +177,7 @@ export class Queue {
   #find(words) {
     this.#search = words.trim().toLowerCase();
     this.refresh();
+    this.list.reveal(this.view.integration);
   }
 
   #empty() {

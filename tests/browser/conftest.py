@@ -150,8 +150,9 @@ class Desk:
 
     @property
     def selected(self) -> str:
-        """The id of the integration selected in the queue."""
-        return str(self.page.locator(".item[aria-selected=true]").get_attribute("data-id"))
+        """The id of the integration selected in the queue, where its row is in sight."""
+        rows = self.page.locator(".item[aria-selected=true]:not([hidden])")
+        return str(rows.first.get_attribute("data-id")) if rows.count() else ""
 
     @property
     def candidate(self) -> int:
