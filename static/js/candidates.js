@@ -29,7 +29,8 @@ export class Candidates {
 
   show({ match, claimed, nudged }, view) {
     this.view = view;
-    this.#candidates = (match?.ranked ?? []).map((found, rank) => ({ ...found, rank, claimed: rank === claimed, nudged: rank === nudged, pose: pose(found.T_1_2) }));
+    const listed = (found, rank) => ({ ...found, rank, claimed: rank === claimed, nudged: rank === nudged, pose: pose(found.T_1_2) });
+    this.#candidates = (match?.ranked ?? []).map(listed);
     text(byId("candidates-note"), note(match, this.#candidates.length));
     const words = ambiguity(this.#candidates);
     byId("candidates-ambiguity").hidden = words === null;
@@ -135,7 +136,8 @@ function ambiguity(candidates) {
   const word = { ambiguous: "Ambiguous", rival: "There is a rival", clear: "Clear" }[how];
   const [far, turn] = [Math.hypot(rival.pose.x - best.pose.x, rival.pose.y - best.pose.y), turned(best.pose, rival.pose)];
   const what = best.score === null ? "value" : "score";
-  return { how, sentence: `${word}: candidate ${rival.rank + 1}, ${fixed(far, 1)} m and ${degrees(turn)}° from the best, has ${fixed(100 * share, 0)} % of its ${what}.` };
+  const where = `candidate ${rival.rank + 1}, ${fixed(far, 1)} m and ${degrees(turn)}° from the best`;
+  return { how, sentence: `${word}: ${where}, has ${fixed(100 * share, 0)} % of its ${what}.` };
 }
 
 const turned = (a, b) => Math.abs(Math.atan2(Math.sin(a.theta - b.theta), Math.cos(a.theta - b.theta)));

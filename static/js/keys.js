@@ -52,7 +52,8 @@ export function listen(actions, root = window) {
 }
 
 const CAMERA =
-  "The keys do the same wherever you are, in the page and in the scene. In the scene W A S D Q E and the arrows move the camera; drag to pan, scroll to zoom, click a segment to see what it adds.";
+  "The keys do the same wherever you are, in the page and in the scene. In the scene W A S D Q E and the arrows move the camera; " +
+  "drag to pan, scroll to zoom, click a segment to see what it adds.";
 const DELIBERATE = new Set(["accept", "reject", "undo", "redo", "skip", "toggle_nudging"]);
 /** Those that the queue itself answers. */
 const LOCAL = new Set(["enter"]);

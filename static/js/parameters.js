@@ -133,7 +133,8 @@ export class ParameterDrawer {
     const { trial, candidates, integration } = this.view.snapshot;
     if (this.dialog.open && integration !== this.#tried && this.#changes().size) this.#try();
     this.#tried = integration;
-    const words = trial ? `Tried on ${pair(integration)}: ${trial.segments.join(" × ")} segments, ${count(candidates, "candidate")}, ${duration(trial.milliseconds)}.` : "Changes show on the selected pair as you make them.";
+    const tried = () => [`${trial.segments.join(" × ")} segments`, count(candidates, "candidate"), duration(trial.milliseconds)].join(", ");
+    const words = trial ? `Tried on ${pair(integration)}: ${tried()}.` : "Changes show on the selected pair as you make them.";
     text(byId("parameters-trial"), words);
   }
 
@@ -165,7 +166,10 @@ function control(parameter, id) {
   return h("input", { type: "number", step, placeholder: parameter.optional ? "none" : null, required: !parameter.optional, ...limits, ...shared });
 }
 
-/** A slider beside a number, for the mouse (the number has the arrow keys): it moves the number, and the number moves it; on a scale of ratios where bounds are far apart. */
+/**
+ * A slider beside a number, for the mouse (the number has the arrow keys): it moves the number, and the number moves it;
+ * on a scale of ratios where bounds are far apart.
+ */
 function slide(parameter, id, input) {
   const low = parameter.minimum ?? parameter.above;
   const high = parameter.maximum ?? parameter.below;

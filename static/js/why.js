@@ -1,6 +1,5 @@
 // Why a candidate has its value: chains and pairs of segments, and what lines of sight deny. Marked in step with the scene.
 
-import { get } from "./api.js";
 import { byId, fill, h, set, text } from "./dom.js";
 import { count, fixed, metres } from "./format.js";
 
@@ -95,14 +94,16 @@ function isPicked(picked, source, segment, first, second) {
 function note({ value, chains, small, names }) {
   const rest = small.reduce((sum, pair) => sum + pair.value, 0);
   const more = rest >= 0.005 ? `, and ${metres(rest)} of pairs too small to match` : "";
-  return `The value of ${metres(value)} is what ${count(chains.length, "chain")} of matching segments of ${names[0]} and ${names[1]} add${more}. Click one to see it in the scene, or a segment there to see it here.`;
+  const adds = `${count(chains.length, "chain")} of matching segments of ${names[0]} and ${names[1]} add${more}`;
+  return `The value of ${metres(value)} is what ${adds}. Click one to see it in the scene, or a segment there to see it here.`;
 }
 
 function chainItem(chain, names) {
   const swatch = h("i.swatch", { "aria-hidden": "true" });
   swatch.style.background = chain.colour;
   const size = count(chain.first.length + chain.second.length, "segment");
-  const head = h("button.chain", { type: "button", "data-source": "chain", "data-number": chain.number, "aria-pressed": "false" }, swatch, `Chain ${chain.number}: ${size}`, h("b.number", {}, metres(chain.value)));
+  const told = { type: "button", "data-source": "chain", "data-number": chain.number, "aria-pressed": "false" };
+  const head = h("button.chain", told, swatch, `Chain ${chain.number}: ${size}`, h("b.number", {}, metres(chain.value)));
   return h("li", {}, head, h("ul", {}, chain.pairs.map((pair) => h("li", {}, pairButton(pair, names)))));
 }
 
@@ -123,7 +124,8 @@ function crossings({ crossings: found, discarded }) {
 
 function score({ score: total, terms, conflicts, names }) {
   if (total === null) return null;
-  const rows = Object.entries(terms).map(([kind, metresOf]) => h("tr", { class: kind }, h("th", { scope: "row" }, KINDS[kind] ?? kind), h("td", {}, metres(metresOf))));
+  const row = ([kind, size]) => h("tr", { class: kind }, h("th", { scope: "row" }, KINDS[kind] ?? kind), h("td", {}, metres(size)));
+  const rows = Object.entries(terms).map(row);
   const table = h("table.numbers.terms", { "aria-label": "What makes up the score" }, h("tbody", {}, rows));
   const denied = conflicts.filter((one) => one.segment !== null).slice(0, 20);
   const list = denied.map((one) => h("li", {}, denial(one, names)));

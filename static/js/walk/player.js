@@ -209,8 +209,14 @@ function layout(p, walk) {
   return [
     h("nav.walk-stages", { "aria-label": "Stages of the run" }, h("p.walk-title", {}, walk.title), p.stages),
     h("section.walk-picture", { "aria-label": "Picture" }, p.figure.element, h("div.controls", {}, p.slider, h("div.buttons", {}, controls))),
-    h("section.walk-words", { "aria-label": "What happens" }, h("div.walk-told", {}, p.title, p.about, p.say, p.entered, p.quantities, p.charts, p.paper), p.algorithm, p.lines),
+    words(p),
   ];
+}
+
+/** What happens at the step, beside the lines of the algorithm. */
+function words(p) {
+  const told = [p.title, p.about, p.say, p.entered, p.quantities, p.charts, p.paper];
+  return h("section.walk-words", { "aria-label": "What happens" }, h("div.walk-told", {}, told), p.algorithm, p.lines);
 }
 
 function line({ number, text: words, indent }) {
