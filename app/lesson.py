@@ -67,8 +67,9 @@ LESSON = (
     ),
     Stop(
         "A metre is not always a metre",
-        "Two segments that do not touch lose five per cent for each tolerance of distance between them. a, b, c and d"
-        " are the four distances; the larger of each two, and of these the smaller, is what counts.",
+        "What two segments that do not touch have in common is multiplied by 0.95 for each tolerance of distance"
+        " between them. a and b are how far the ends of the one lie from the line of the other, c and d the other way"
+        " round; the larger of each two, and of these the smaller, is what counts.",
         {**HALL, "heuristic": "consecutive"},
         "pairs:best",
         "a strong penalty (Fig. 3)",
@@ -124,7 +125,8 @@ LESSON = (
     ),
     Stop(
         "Chains",
-        "Once the maps lie on each other, everything that hangs together by matching is one wall seen twice: a chain."
+        "Once the maps lie on each other, everything that hangs together by matching is one wall, or walls that join,"
+        " seen twice: a chain."
         " Chains that are found are what the two scans really have in common.",
         {**HALL, "heuristic": "consecutive"},
         "chains",
@@ -133,7 +135,7 @@ LESSON = (
     Stop(
         "One polyline for each wall",
         "A polyline takes the place of a chain. It is bent through the segment that lies farthest from it, again and"
-        " again. Greedy lets each segment in once; plain may go round in circles.",
+        " again. Greedy uses each segment once; plain may go round in circles and is then stopped.",
         {**HALL, "heuristic": "consecutive"},
         "polylines",
         "the largest chain",

@@ -127,7 +127,8 @@ class Subject:
         if self.merging:
             return walk_merge(self._maps(), self.parameters, self.heuristic, self.mode, self.title)
         one, other = (self.scan(scan) for scan in self.scans)
-        return walk_scans(one, other, self.parameters, self.heuristic, self.mode, self.title, self.truth)
+        names = str(self.scans[0]), str(self.scans[1])
+        return walk_scans(one, other, self.parameters, self.heuristic, self.mode, self.title, self.truth, names)
 
     def pair_under(self, parameters: Parameters) -> tuple[SegmentMap, SegmentMap]:
         """The two maps of a pair under some parameters."""

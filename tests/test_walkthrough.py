@@ -109,6 +109,58 @@ def test_a_discarded_candidate_says_which_segments_cross(scans):
     assert any(shape.get("mark") == "cross" for shape in step.shapes)
     pairs = made.walk.stage(f"pairs:{k + 1}")
     assert "7" in {pairs.step(mark.index).line for mark in pairs.marks}
+    assert pairs.step(pairs.count - 1).line == "7", "nothing is compared after the pair that discards it"
+    assert "will be discarded" in pairs.step(0).say
+    assert pairs.step(0).quantities == (("value", "discarded", ""),)
+    assert {pairs.step(k).line for k in range(1, pairs.count - 1)} <= {"10", "14", "16", "18"}
+
+
+def test_verified_mode_says_what_chooses(scans):
+    """The value does not choose; the result names the candidate, and its value before and after refinement."""
+    made = walk_scans(*scans, preset("verified"), None, "verified", names=("0.0", "0.1"))
+    best, found = made.integration.match.best, made.found
+    assert "the value does not choose" in made.walk.stage("evaluation").about
+    assert "Scan 0.0 of the log" in made.walk.stage("points-1").step(0).say
+    last = made.walk.stage("result").step(made.walk.stage("result").count - 1).say
+    assert f"candidate {best.index + 1}, refined: its value was {found.values[best.index]:.3f} m" in last
+    assert f"now its value is {best.value:.3f} m" in last
+    assert f"{best.evidence.contradicted:.2f} m contradicted, {best.evidence.shadowed:.2f} m shadowed" in last
+    assert "are seen by both" not in last
+
+
+def test_lines_of_sight_tell_their_weights(scans):
+    """Each kind says how many metres it is, how they count and what the score loses by it; together they are it."""
+    parameters = preset("verified").replace(unseen_weight=0.3)
+    stage = walk_scans(*scans, parameters, None, "verified").walk.stage("sight")
+    parts = [{name: float(value) for name, value, _ in stage.step(k).quantities} for k in range(5)]
+    assert abs(sum(part["part of the score"] for part in parts[1:]) - parts[0]["score"]) < 0.003
+    assert all(colour in stage.step(0).say for colour in ("Green", "Red", "Orange", "Grey"))
+    assert "they count 0.3 times, so the score loses" in stage.step(4).say
+    for k, part in enumerate(parts[1:], start=1):
+        said = stage.step(k).say
+        assert "nothing is" in said or f"{abs(part['part of the score']):.2f} m" in said
+
+
+def test_a_polyline_says_how_far_its_farthest_segment_lies(made):
+    """Greedy ends when no segment is far, or when those still far were used; then it says how far they are."""
+    stage = made.walk.stage("polylines")
+    for step in map(stage.step, range(stage.count)):
+        if "is done" in step.say:
+            (far,) = [float(value) for name, value, _ in step.quantities if name.startswith("farthest")]
+            assert ("was used already" in step.say) == (far > 0.05)
+
+
+def test_laid_candidates_lie_as_they_say(scans):
+    """Under a candidate of starts the starts coincide, and so for ends and middles."""
+    made = walk_scans(*scans, preset("verified"), "extremes", "verified")
+    found, stage = made.found, made.walk.stage("candidates")
+    shares = {"start on start": 0.0, "end on end": 1.0, "middle on middle": 0.5}
+    for k in range(0, len(found), 37):
+        (share,) = [share for words, share in shares.items() if words in stage.step(k + 1).say]
+        (i, _), (j, _) = found.pairs(k)
+        one, other = found.map_1.coordinates[i], found.map_2.moved(found.pose(k)).coordinates[j]
+        at = [ends[:2] + share * (ends[2:] - ends[:2]) for ends in (one, other)]
+        np.testing.assert_allclose(*at, atol=1e-9)
 
 
 def test_points_end_as_the_segments_of_the_scan(made):

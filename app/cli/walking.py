@@ -82,7 +82,7 @@ def of_project(project: Path, out: Path) -> None:
         first, second = (edges[0].first, edges[0].second) if edges else _first_two(inputs.scan_ids)
         title = f"{state.name}: scans {first} and {second}"
         how = state.parameters, state.heuristic, state.mode, title
-        made = walk_scans(inputs.scan(first), inputs.scan(second), *how).walk
+        made = walk_scans(inputs.scan(first), inputs.scan(second), *how, names=(str(first), str(second))).walk
         held = sorted({scan for edge in edges for scan in (edge.first, edge.second)})
         graph = walk_graph(edges, {scan: inputs.segment_map(scan, state.parameters) for scan in held})
     _write(replace(made, stages=made.stages + graph.stages, base={**made.base, **graph.base}), out, kind)
@@ -113,7 +113,8 @@ def _pair(log: Path, first: int, second: int, method: Method) -> Walkthrough:
         name, map_of = segment_maps(log, method.parameters)
         return walk_maps(map_of(first), map_of(second), *how, f"{name}: maps {first} and {second}").walk
     held = read(log)
-    return walk_scans(held.scan(first), held.scan(second), *how, f"{held.name}: scans {first} and {second}").walk
+    title, names = f"{held.name}: scans {first} and {second}", (str(first), str(second))
+    return walk_scans(held.scan(first), held.scan(second), *how, title, names=names).walk
 
 
 def _merge(log: Path, first: int, last: int, method: Method) -> Walkthrough:

@@ -112,7 +112,7 @@ class _Angles:
             )
         if state == "without vertex":
             least = math.degrees(self.parameters.min_vertex_angle)
-            return f"{pair} are within {least:.0f}° of parallel: their lines meet far away or nowhere, so no angle."
+            return f"{pair} are within {least:.1f}° of parallel: their lines meet far away or nowhere, so no angle."
         return f"{pair} are left out: {_WHY[self.name](self, i, j)}."
 
     def _quantities(self, i: int, j: int) -> tuple[Quantity, ...]:
@@ -291,12 +291,7 @@ def candidates_stage(found: Found) -> Stage:
     return Stage(
         id="candidates",
         title="Candidates",
-        about="A candidate is a guess at how map 2 lies on map 1: a turn and a shift. "
-        + (
-            "Each pair of segments, one of either map, gives three."
-            if found.laid(0)
-            else "Each pair of equal angles, one of either map, gives one."
-        ),
+        about=f"A candidate is a guess at how map 2 lies on map 1: a turn and a shift. {_rounds(found)}",
         algorithm="laid" if found.laid(0) else "3" if found.draws else "2",
         count=len(found) + 1,
         step=lambda k: _candidates_idea(found) if k == 0 else _candidate_step(found, k - 1),
@@ -304,6 +299,32 @@ def candidates_stage(found: Found) -> Stage:
         stops=found.spread(),
         box=found.box,
     )
+
+
+PLACED = (
+    "start on start",
+    "end on end",
+    "middle on middle",
+    "start on end, turned round",
+    "end on start, turned round",
+    "middle on middle, turned round",
+)
+"""how one segment lies on another, by the number of its block"""
+
+
+def _rounds(found: Found) -> str:
+    """What gives the candidates."""
+    equal = math.degrees(found.parameters.angle_difference_tolerance)
+    angles_give = f"two angles, one of each map, that are equal within {equal:.1f}° give one."
+    if not len(found) or not found.laid(0):
+        return angles_give.capitalize()
+    laid = (
+        "each pair of segments, one of each map, gives three: start on start, end on end, middle on middle"
+        f"{', and three more with map 2 turned round' if found.placed.max() > 2 else ''}."
+    )
+    if found.placed.min() >= 0:
+        return laid.capitalize()
+    return f"First round: {laid} It was not clear yet which is right, so there is a second round: {angles_give}"
 
 
 def _candidates_idea(found: Found) -> Step:
@@ -330,18 +351,20 @@ def _candidate_step(found: Found, k: int) -> Step:
     pose = (metres("x", T_1_2.x), metres("y", T_1_2.y), degrees("turn", T_1_2.theta))
     if found.laid(k):
         say = (
-            f"Candidate {k + 1} of {len(found)}: segment {pair_2[0]} of map 2 is laid on segment {pair_1[0]} of map 1."
-            " No angle is needed, so even a corridor gives candidates."
+            f"Candidate {k + 1} of {len(found)}: segment {pair_2[0]} of map 2 is laid on segment {pair_1[0]} of map 1,"
+            f" {PLACED[int(found.placed[k])]}. No angle is needed, so even a corridor gives candidates."
         )
         shapes += [of("first", "accent", pair_1[:1], width=5), of("second", "good", pair_2[:1], T_1_2, width=2.5)]
         return Step("3", say, tuple(shapes), pose)
-    size_1, size_2 = found.sizes(k)
+    size_1, size_2 = (float(wrap(size)) for size in found.sizes(k))
+    second = " (second round)" if found.laid(0) else ""
     shapes += angle_shapes(found.map_1, pair_1, "first")
     shapes += [of("second", "good", pair_2, T_1_2, width=3)]
     say = (
-        f"Candidate {k + 1} of {len(found)}: the angle between segments {pair_2[0]} and {pair_2[1]} of map 2 (green) is"
-        f" laid on the angle between {pair_1[0]} and {pair_1[1]} of map 1 (marked). Vertex comes to lie on vertex; if"
-        " the angles differ a little, half of it goes to either side. Does the rest of orange fall on blue?"
+        f"Candidate {k + 1} of {len(found)}{second}: the angle between segments {pair_2[0]} and {pair_2[1]} of map 2"
+        f" (green) is laid on the angle between {pair_1[0]} and {pair_1[1]} of map 1 (marked). Vertex comes to lie on"
+        " vertex; if the angles differ a little, half of the difference goes to each side. Does the rest of"
+        " orange fall on blue?"
     )
     off = degrees("they differ by", abs(float(wrap(size_1 - size_2))))
     told = (degrees("angle of map 1", size_1), degrees("angle of map 2", size_2), off, *pose)

@@ -36,6 +36,9 @@ class Found:
     sizes_1: FloatArray
     """radians; NaN where no angle was superimposed"""
     sizes_2: FloatArray
+    placed: IntArray
+    """how a single segment is laid on a single one: 0 starts, 1 ends, 2 middles together, 3 to 5 the same turned
+    round; -1: angles are superimposed"""
     twice: int
     draws: int
     box: Box | None = field(init=False)
@@ -54,7 +57,7 @@ class Found:
         sizes = [_sizes(trace, place) for place, event in enumerate(trace.events) if event.what == "candidates"]
         joined = np.concatenate([np.empty((0, 2)), *sizes])
         twice = sum(len(event["block"]) - len(event["new"]) for event in events)
-        return cls(map_1, map_2, parameters, held, joined[:, 0], joined[:, 1], twice, held.draws)
+        return cls(map_1, map_2, parameters, held, joined[:, 0], joined[:, 1], _placed(trace), twice, held.draws)
 
     def __len__(self) -> int:
         return len(self.held)
@@ -128,6 +131,18 @@ class Found:
         rows = rows[rows < len(self)]
         steps = [[int(k) + 1, round(float(self.running[k]), 3)] for k in rows]
         return {"kind": "series", "title": "Best value so far", "x": "candidates tried", "y": "m", "values": steps}
+
+
+def _placed(trace: Trace) -> IntArray:
+    """How each candidate is laid: the heuristic ``extremes`` gives a block for each way."""
+    name, block, found = "", 0, [np.empty(0, np.int64)]
+    for event in trace.events:
+        if event.what == "heuristic":
+            name, block = event["name"], 0
+        elif event.what == "candidates":
+            found.append(np.full(len(event["new"]), block if name == "extremes" else -1))
+            block += 1
+    return np.concatenate(found)
 
 
 def _sizes(trace: Trace, place: int) -> FloatArray:

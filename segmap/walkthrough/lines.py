@@ -43,15 +43,15 @@ ALGORITHMS = {
         "Find candidates (Algorithm 2)",
         _lines(
             """
-1 | begin without angles of map 1
+1 | start with an empty list of angles of map 1
 2 | for each pair of segments of map 1 that the heuristic lets through
 3 |   keep the angle between the two
 4 | (next pair)
-5 | begin without angles of map 2
+5 | start with an empty list of angles of map 2
 6 | for each pair of segments of map 2 that the heuristic lets through
 7 |   keep the angle between the two
 8 | (next pair)
-9 | begin without candidates
+9 | start with an empty list of candidates
 10 | for each angle of map 1 with each angle of map 2
 11 |   are the two angles equal, within angle_difference_tolerance?
 12 |   then the motion that lays the one on the other is a candidate
@@ -64,7 +64,7 @@ ALGORITHMS = {
         "Find candidates by drawing lots (Algorithm 3)",
         _lines(
             """
-1 | begin without candidates
+1 | start with an empty list of candidates
 2 | for each round k: let shorter segments take part than in the round before
 3 |   20 times 2 to the power k, in round k
 4 |     draw two segments of map 1 from those that take part
@@ -83,10 +83,10 @@ ALGORITHMS = {
         "Find candidates from single segments (beyond the paper)",
         _lines(
             """
-1 | for each segment of map 1 with each segment of map 2
+1 | first round: for each segment of map 1 with each segment of map 2
 2 |   turn map 2 until both segments have one heading
 3 |   lay start on start, end on end, middle on middle: three candidates
-4 | not clear yet which is right? then lay equal angles on each other as well
+4 | second round, if it is not clear yet which is right: lay equal angles on each other as well
 """
         ),
     ),
@@ -99,18 +99,18 @@ ALGORITHMS = {
 3 |   move map 2 as the candidate says
 4 |   the value of this candidate is 0 to begin with
 5 |   for each pair of a segment of map 1 and a segment of map 2
-6 |     do they cross, both longer than segment_length_refuse?
+6 |     do they cross, both longer than segment_length_refuse, at more than refuse_angle?
 7 |     then discard this candidate: go on with the next one
 8 |     (otherwise: go on with this pair)
-9 |     are they farther apart than segment_distance_threshold?
+9 |     is their distance larger than segment_distance_threshold (5 by default) tolerances?
 10 |     then this pair adds nothing: go on with the next pair
 11 |     (otherwise: they may be the same wall)
 12 |     project each segment on the line of the other
 13 |     measure how much of each the other covers: l1 and l2
 14 |     matching value: the mean of l1 and l2
 15 |     do the two not touch?
-16 |     then take 5 % off for each tolerance of distance between them
-17 |     (otherwise: in full)
+16 |     then multiply it by distance_penalty (0.95 by default) to the power of distance / tolerance
+17 |     (otherwise: it counts in full)
 18 |     add the matching value to the value of the candidate
 19 |   (next pair)
 20 |   is the value higher than the best so far?
@@ -119,7 +119,7 @@ ALGORITHMS = {
 23 | (next candidate)
 24 | under the best candidate, for each pair of segments that match
 25 |   does one of the two belong to a chain already?
-26 |   then the pair joins that chain
+26 |   then the pair joins that chain; a pair that links two chains makes them one
 27 |   otherwise
 28 |   the pair begins a new chain
 29 |   (done with this pair)
@@ -135,12 +135,12 @@ ALGORITHMS = {
 2 | put in every segment that matches nothing, as it is
 3 | for each chain
 4 |   P0: one line between the two ends of the chain that are farthest apart
-5 |   find the segment that lies farthest from its closest edge of the polyline
+5 |   find the segment that lies farthest from its closest edge of the polyline (greedy: of those not used yet)
 6 |   n = 0
-7 |   while that distance is larger than fusion_tolerance
+7 |   while that distance is larger than fusion_tolerance (greedy: and not every segment is used)
 8 |     n = n + 1
-9 |     Pn: replace that edge by a detour through the segment
-10 |     find the segment that now lies farthest from its closest edge
+9 |     Pn: replace that edge by a detour through the segment, which is now used
+10 |     find the segment that now lies farthest from its closest edge (greedy: of those not used yet)
 11 |   (look again)
 12 |   put the polyline in, in place of the segments of the chain
 13 | (next chain)
@@ -197,13 +197,14 @@ C | pivot: integrate neighbours, compose the motions, fuse each scan once; n - 1
         "Verify by lines of sight (beyond the paper)",
         _lines(
             """
-1 | for each candidate: where does each point of one scan lie as the other sensor saw the place?
-2 |   at a surface it saw: supported
-3 |   before such a surface, where it saw nothing: contradicted
-4 |   close behind a surface: shadowed; where it saw nothing at all: unseen
-5 | score: metres supported, less what speaks against it
-6 | of candidates close to each other keep the best; move each so that the points fit best
-7 | score again; the best is judged, and how close its rivals come
+1 | under each candidate, ask for each point of one scan what the other sensor saw of that place
+2 |   it saw a surface there: supported
+3 |   in front of a surface, in space its beam passed through: contradicted
+4 |   close behind a surface (less than shadow_depth): shadowed
+5 |   where it could not look: unseen
+6 | score = supported - conflict_weight x contradicted - shadow_weight x shadowed - unseen_weight x unseen (metres)
+7 | of candidates close to each other keep the best; move each so that the points fit better
+8 | score again; the best is judged, and how close its rivals come
 """
         ),
     ),

@@ -13,8 +13,9 @@ from segmap.segments import SegmentMap, extract
 from segmap.tracing import Trace
 from segmap.walkthrough.angles import angles_stages, candidates_stage, draws_stage
 from segmap.walkthrough.found import Found
-from segmap.walkthrough.fusing import chains_stage, polylines_stage, result_stage
+from segmap.walkthrough.fusing import chains_stage, polylines_stage
 from segmap.walkthrough.points import points_stage
+from segmap.walkthrough.results import result_stage
 from segmap.walkthrough.sights import refinement_stage, sight_stage
 from segmap.walkthrough.steps import Stage, Walkthrough, rounded
 from segmap.walkthrough.values import PAIRS, evaluation_stage, pairs_stage
@@ -39,10 +40,12 @@ def walk_scans(
     mode: str = "paper",
     title: str = "",
     truth: Pose2 | None = None,
+    names: tuple[str, str] = ("", ""),
 ) -> PairWalk:
     """A walkthrough of two scans, their points and how they become segments included.
 
-    ``truth``, ``T_1_2`` where it is known, is shown at the end and never used.
+    ``truth``, ``T_1_2`` where it is known, is shown at the end and never used. ``names``: those of the scans in their
+    log, such as ``0.21``.
 
     Raises:
         ParameterError: there is no such heuristic or mode.
@@ -50,7 +53,8 @@ def walk_scans(
     parameters = parameters or Parameters()
     with tracing.recording() as trace:
         maps = extract(scan_1, parameters, index=0), extract(scan_2, parameters, index=1)
-    points = [points_stage(which, event, parameters) for which, event in enumerate(trace.all("segments"), start=1)]
+    told = zip(trace.all("segments"), names, strict=True)
+    points = [points_stage(which, event, parameters, name) for which, (event, name) in enumerate(told, start=1)]
     return _walk(maps, points, parameters, heuristic, mode, title, truth)
 
 
@@ -104,7 +108,7 @@ def _stages(
     match, parameters = integration.match, found.parameters
     stages = [*angles_stages(trace, parameters), *draws_stage(trace, maps, parameters)]
     if len(found):
-        stages += [candidates_stage(found), evaluation_stage(found, match.mode, truth)]
+        stages += [candidates_stage(found), evaluation_stage(found, match, truth)]
     if found.best is not None:
         stages.append(pairs_stage(found, found.best))
     if match.T_1_2 is not None:
@@ -112,4 +116,4 @@ def _stages(
         known_as = "The refined candidate" if match.mode != "paper" else "The best candidate"
         stages += sight_stage(maps, match.T_1_2, parameters, found.box, known_as)
         stages += [*chains_stage(trace, maps, found.box), *polylines_stage(trace, parameters)]
-    return [*stages, result_stage(match, integration.fusion, maps, parameters, found.box, truth)]
+    return [*stages, result_stage(match, integration.fusion, found, truth)]

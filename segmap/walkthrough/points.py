@@ -31,9 +31,12 @@ class _Bend:
     distance: float
 
 
-def points_stage(which: int, event: Event, parameters: Parameters) -> Stage:
-    """The stage of one scan of a pair, told by what :func:`segmap.segments.extract` reported of it."""
-    held = _Scan(which, event, parameters)
+def points_stage(which: int, event: Event, parameters: Parameters, name: str = "") -> Stage:
+    """The stage of one scan of a pair, told by what :func:`segmap.segments.extract` reported of it.
+
+    ``name``: what the log calls the scan, if that is known.
+    """
+    held = _Scan(which, event, parameters, name)
     first_split = next((k for k, bend in enumerate(held.bends) if bend.distance > parameters.split_tolerance), 0)
     marks = (Mark(0, "all points"), Mark(1, "clusters"), Mark(2 + first_split, "the first bend"))
     return Stage(
@@ -50,8 +53,8 @@ def points_stage(which: int, event: Event, parameters: Parameters) -> Stage:
 
 
 class _Scan:
-    def __init__(self, which: int, event: Event, parameters: Parameters) -> None:
-        self.which, self.parameters = which, parameters
+    def __init__(self, which: int, event: Event, parameters: Parameters, name: str) -> None:
+        self.which, self.parameters, self.name = which, parameters, name
         self.points: FloatArray = event["points"]
         self.clusters: list[FloatArray] = event["clusters"]
         self.map: SegmentMap = event["map"]
@@ -72,9 +75,10 @@ class _Scan:
         return self._split(self.bends[k - 2]) if k < len(self.bends) + 2 else self._whole()
 
     def _raw(self) -> Step:
+        known = f"Scan {self.name} of the log is called scan {self.which} here, and will become map {self.which}. "
         say = (
-            f"The sensor stands at the cross and turned once; each of the {len(self.points)} dots is where a beam"
-            " met something."
+            f"{known if self.name else ''}The sensor stands at the cross and turned once; each of the"
+            f" {len(self.points)} dots is where a beam met something."
         )
         return Step("1", say, (_sensor(), points(self.points, self.role)), (("points", str(len(self.points)), ""),))
 
@@ -120,8 +124,8 @@ class _Scan:
         )
         name = ("first", "second")[self.which - 1]
         say = (
-            f"The {_count(len(self.map), 'segment')} of scan {self.which}: it is now a small map, map {self.which}."
-            f"{left_out}"
+            f"The {_count(len(self.map), 'segment')} of scan {self.which}: it is now a small map, map {self.which}. Its"
+            f" segments are numbered from 0.{left_out}"
             " Long ones are walls the sensor saw well; many short ones mean clutter."
         )
         told = (("segments", str(len(self.map)), ""), metres("total length", float(self.map.lengths.sum()), 2))
