@@ -51,9 +51,9 @@ def chains_stage(trace: Trace, maps: tuple[SegmentMap, SegmentMap], box: Box | N
         id="chains",
         title="Chains",
         about="Map 2 lies where the winning candidate puts it. Two segments match if their matching value is above"
-        f" {f'{LEAST_MATCH:g}'.replace('-0', '-')} m. A chain is everything that hangs together by"
-        " matching: if segment a of one map matches b of the other, and b matches c as well, then a, b and c are one wall, or walls that join. Each chain becomes"
-        " one polyline.",
+        f" {f'{LEAST_MATCH:g}'.replace('-0', '-')} m. A chain is everything that hangs together by matching: if segment"
+        " a of one map matches b of the other, and b matches c as well, then a, b and c are one wall, or walls that"
+        " join. Each chain becomes one polyline.",
         algorithm="4",
         count=len(held.pairs) + 1,
         step=held.step,

@@ -48,7 +48,7 @@ def _unmatched(match: Match, maps: tuple[SegmentMap, SegmentMap]) -> Step:
     shapes = (of("first", "first", rest[0], width=2.5), of("second", "second", rest[1], match.T_1_2, width=2.5))
     say = (
         f"{len(rest[0])} segments of map 1 and {len(rest[1])} of map 2 match nothing: only one of the scans saw what"
-        " they stand for. They go into the fused map as they are."
+        " they stand for, or they lie too far from each other. They go into the fused map as they are."
     )
     return Step("2", say, shapes, (("unmatched", str(len(rest[0]) + len(rest[1])), ""),))
 
