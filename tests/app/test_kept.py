@@ -41,6 +41,7 @@ def test_the_text_of_the_queue_is_the_queue(session: Session) -> None:
                 session.decide([id], step)
         except ProjectError:
             continue
+        assert session.settle(60.0)
         text = session.queue_text()
         assert json.loads(text.plain)["integrations"] == [Integration.of(row).model_dump() for row in session.rows()]
         assert gzip.decompress(text.packed) == text.plain

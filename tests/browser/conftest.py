@@ -27,6 +27,7 @@ STARTED = re.compile(r"segmap is at (http://\S+?)/ ")
 START_SECONDS = 60.0
 STOP_SECONDS = 20.0
 MATCHING_SECONDS = 180.0
+SELECTED = ".item[aria-selected=true]:not([hidden])"
 PATIENCE = 20_000.0
 """milliseconds; a loaded machine draws slowly"""
 DRAWN = "() => window.__viserMutable?.camera && '/second' in (window.__viserMutable.nodeRefFromName ?? {})"
@@ -150,9 +151,8 @@ class Desk:
 
     @property
     def selected(self) -> str:
-        """The id of the integration selected in the queue, where its row is in sight."""
-        rows = self.page.locator(".item[aria-selected=true]:not([hidden])")
-        return str(rows.first.get_attribute("data-id")) if rows.count() else ""
+        """The id of the integration selected in the queue; waits for its row to be in sight."""
+        return str(self.page.locator(SELECTED).get_attribute("data-id"))
 
     @property
     def candidate(self) -> int:
@@ -175,7 +175,8 @@ class Desk:
                 return
             self.page.wait_for_timeout(25)
         told = self.page.locator("[role=alert], [role=status]").all_inner_texts()
-        queue = f"{self.selected} is selected, the filters say {self.page.locator('#filters').inner_text()!r}"
+        selected = [row.get_attribute("data-id") for row in self.page.locator(SELECTED).all()]
+        queue = f"{selected} are selected and in sight, the filters say {self.page.locator('#filters').inner_text()!r}"
         pytest.fail(f"still waiting for: {what}; {queue}; told: {told}; {self.picture('failed')} shows the page")
 
     def picture(self, name: str) -> Path:

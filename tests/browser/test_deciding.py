@@ -85,7 +85,7 @@ def test_decide_with_name_and_reason(new_desk: Callable[..., Any], server: Any, 
     page.locator("[data-filter=all]").click()
     page.keyboard.press("u")
     desk.until(lambda: decided(server, project, pair)["state"] == "pending", "the undo")
-    assert desk.selected == pair
+    desk.until(lambda: desk.selected == pair, "the pair it was about")
 
 
 def test_two_browsers(new_desk: Callable[..., Any], server: Any, project: str) -> None:
@@ -299,7 +299,7 @@ def test_a_server_killed_after_a_click_comes_back(desk: Any, server: Any) -> Non
     desk.page.locator("#queue").focus()
     desk.page.keyboard.press("u")
     desk.until(lambda: decided(server, project, pair)["state"] == "pending", "the undo after the restart")
-    assert desk.page.locator("#redo").is_enabled()
+    desk.until(desk.page.locator("#redo").is_enabled, "something to redo")
     desk.until(lambda: desk.selected == pair, "the pair again")
     desk.page.keyboard.press("x")
     desk.until(lambda: decided(server, project, pair)["state"] == "rejected", "another decision")
