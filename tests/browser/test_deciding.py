@@ -97,7 +97,7 @@ def test_two_browsers(new_desk: Callable[..., Any], server: Any, project: str) -
         desk.page.keyboard.press("Enter")
         desk.until(lambda d=desk, w=who: snapshot(d, server)["who"] == w, "the name")
     pair = first.selected
-    second.page.evaluate("id => { location.hash = id }", pair)
+    second.page.locator("#search").fill(pair)
     second.row(pair).click()
     second.until(lambda: snapshot(second, server)["integration"] == pair, "the same pair")
     shown = snapshot(second, server)["revision"]

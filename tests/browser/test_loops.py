@@ -136,6 +136,8 @@ def test_pairs_by_hand_and_from_a_file(desk: Any, server: Any, tmp_path: Path) -
     show_the_claim(desk)
     desk.page.locator("#queue").focus()
     desk.page.keyboard.press("y")
+    desk.until(lambda: row(server, project, "0.2-0.8")["silenced"], "what the optimiser makes of it")
+    desk.row("0.2-0.8").click()
     desk.page.locator("#detail-graph").get_by_text("the optimiser silences it").wait_for()
     desk.picture("loops-silenced")
     desk.page.locator("#tab-map").click()
