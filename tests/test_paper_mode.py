@@ -59,6 +59,7 @@ def assert_same_as_plain(map_1, map_2, heuristic, parameters):
 
 @pytest.mark.parametrize("heuristic", COMPARED)
 @pytest.mark.parametrize("parameters", [Parameters(), LITERAL])
+@pytest.mark.slow
 def test_real_pairs_give_what_the_plain_reading_gives(benchmarks, datasets, heuristic, parameters):
     """At least 50 pairs of five real logs: candidates, best value and pose are those of brute force in numpy.
 

@@ -169,6 +169,7 @@ def test_hard_maps_have_the_best_of_brute_force(always_bounded, seed, count, wor
 
 @pytest.mark.parametrize("workers", [1, 2])
 @pytest.mark.parametrize("parameters", [preset("default"), preset("paper-lab")])
+@pytest.mark.slow
 def test_real_pairs_have_the_best_of_brute_force(always_bounded, benchmarks, datasets, parameters, workers):
     """All kinds of pairs of five logs, whatever the number wanted."""
     compared = 0

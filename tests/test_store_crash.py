@@ -81,6 +81,7 @@ def why_not(path: Path) -> str:
     return str(caught.value)
 
 
+@pytest.mark.slow
 def test_every_acknowledged_event_survives_a_kill(tmp_path: Path) -> None:
     """Killed at random moments while it writes, again and again on one file: nothing it acknowledged is lost."""
     path = tmp_path / "p.segmap"

@@ -38,6 +38,7 @@ def decide(client: Any, project: str, verdict: str, *ids: str, **more: Any) -> A
 # --- the whole road -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_from_a_sample_to_an_exported_map_and_back_after_a_restart(make_client: Callable[..., Any]) -> None:
     """Create, match, look, decide, undo, export; after a restart everything decided is there, with the same map."""
     client = make_client()
@@ -154,6 +155,7 @@ def test_decisions_answer_with_their_rows(client: Any, project: str) -> None:
     assert made["rows"][0]["state"] == "pending"
 
 
+@pytest.mark.slow
 def test_the_threshold_and_the_parameters(client: Any, project: str) -> None:
     """A threshold is tried, then set; a preset, a heuristic and single parameters are set in one request."""
     url = f"/api/projects/{project}"

@@ -67,6 +67,7 @@ def test_the_documented_keys_and_those_beside_them(run: Run, pairs: Path) -> Non
     assert told["cpu_milliseconds"]["median"] <= told["cpu_milliseconds"]["95 %"]
 
 
+@pytest.mark.slow
 def test_failures_are_named_and_drawn(run: Run, pairs: Path, tmp_path: Path) -> None:
     """The text names the pair; its picture and a page that shows it are in the folder."""
     folder = tmp_path / "new" / "failures"

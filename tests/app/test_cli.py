@@ -324,6 +324,7 @@ def merged(document: Callable[..., Any], tmp_path: Path) -> Any:
     return document("merge", FIRST, SECOND, *outputs)
 
 
+@pytest.mark.slow
 def test_merge_replay_and_export_agree(merged: Any, run: Run, tmp_path: Path) -> None:
     """The project replays to the hash that merging printed, and exports the same segments."""
     assert run("replay", tmp_path / "map.segmap") == (0, f"{merged['hash']}\n", "")

@@ -13,6 +13,7 @@ ROUNDS = int(os.environ.get("SEGMAP_CRASHES", "30")) // 5
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="the victim is forked, which this system cannot do")
 
 
+@pytest.mark.slow
 def test_a_killed_server_loses_nothing_it_acknowledged(tmp_path: Path, log_bytes: bytes) -> None:
     """Killed again and again while three people decide, add logs and make projects; a new server goes on each time."""
     workspace, count = tmp_path / "projects", 0

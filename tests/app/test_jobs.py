@@ -254,6 +254,7 @@ def test_warming_up_is_waited_for(tmp_path: Path) -> None:
     assert (tmp_path / "done").exists()
 
 
+@pytest.mark.slow
 def test_what_only_large_searches_need_is_compiled_too() -> None:
     """Bounds are used for many candidates only; small maps alone would leave their kernels to the first user."""
     first()

@@ -14,6 +14,7 @@ ROUNDS = int(os.environ.get("SEGMAP_CRASHES", "30")) // 5
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="the victim is forked, which this system cannot do")
 
 
+@pytest.mark.slow
 def test_a_killed_server_comes_back_with_every_decision_and_the_same_map(tmp_path: Path, log_bytes: bytes) -> None:
     """Again and again on one project: nothing acknowledged is lost, and replay gives the map the next server shows."""
     workspace, count = tmp_path / "projects", 0

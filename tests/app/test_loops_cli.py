@@ -66,6 +66,7 @@ def test_loops_are_found_told_and_kept(project: Path, capsys: pytest.CaptureFixt
     assert "0 are new in the queue." in out.splitlines()[-1]
 
 
+@pytest.mark.slow
 def test_every_closure_can_be_had_and_from_a_cluster(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Not only a few of each revisit; the same whoever does the work. A scheduler that is not there is said."""
     distributed = pytest.importorskip("distributed")

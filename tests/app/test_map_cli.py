@@ -28,6 +28,7 @@ def truth() -> dict[str, Pose2]:
     return {f"{n}.{i}": Pose2(*pose) for n, log in enumerate(LOGS) for i, pose in enumerate(poses[log.name])}
 
 
+@pytest.mark.slow
 def test_two_logs_become_one_map_in_files_others_read(run: Run, tmp_path: Path, truth: dict[str, Pose2]) -> None:
     """Every scan is placed where it is; the map and the trajectory are written, and the document says the same."""
     drawing, segments, path = (tmp_path / name for name in ("map.svg", "map.geojson", "path.tum"))

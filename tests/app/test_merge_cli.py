@@ -50,6 +50,7 @@ def near_the_truth(document: Any) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.slow
 def test_every_method_merges_a_thinned_log(merged: Callable[..., Any], run: Run, method: str, tmp_path: Path) -> None:
     """Every fourth scan and what bridges them: placed truly or named; the steps are told, parts before the whole.
 

@@ -45,6 +45,7 @@ def site(
 
 
 @pytest.mark.parametrize(("path", "method"), OPERATIONS, ids=lambda part: part)
+@pytest.mark.slow
 def test_no_request_breaks_the_server(site: tuple[Any, dict[str, str], Any], path: str, method: str) -> None:
     """Answers are 2xx or 4xx, and a refusal is a sentence."""
     client, real, description = site

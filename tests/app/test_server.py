@@ -70,6 +70,7 @@ def events(response: httpx.Response) -> Iterator[dict[str, Any]]:
             yield json.loads(line.removeprefix("data: "))
 
 
+@pytest.mark.slow
 def test_served_while_it_matches_and_ended_while_pages_listen(tmp_path: Path) -> None:
     """The page is there at once, events come as matches are found, and Ctrl+C ends it with streams open."""
     with running(str(tmp_path / "projects"), str(samples_folder() / "hall.log")) as server:
@@ -87,6 +88,7 @@ def test_served_while_it_matches_and_ended_while_pages_listen(tmp_path: Path) ->
         assert again.url.rpartition("/")[2] == server.url.rpartition("/")[2]
 
 
+@pytest.mark.slow
 def test_two_pages_see_each_others_decisions(tmp_path: Path) -> None:
     """What one decides, the other's stream tells."""
     with running(str(tmp_path / "projects"), str(samples_folder() / "hall.log")) as server:
@@ -221,6 +223,7 @@ def answered(connection: socket.socket) -> bytes:
     return b"".join(pieces)
 
 
+@pytest.mark.slow
 def test_a_gibibyte_is_refused(tmp_path: Path) -> None:
     """By its declared length before any of it is read; without one, at the bound: never in memory, and gone then."""
     folder = tmp_path / "temporary"

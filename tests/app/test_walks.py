@@ -84,6 +84,7 @@ def test_steps_that_are_not_there(client, more, status):
     assert client.get("/api/walk/steps", params={**HALL, **more}).status_code == status
 
 
+@pytest.mark.slow
 def test_files(client):
     """The page holds every stage and fetches nothing; the archive holds numbered PNGs, the animation its frames."""
     page = client.get("/api/walk/file/html", params=HALL)

@@ -235,6 +235,7 @@ def test_real_graph_logs(datasets, name, vertices, edges, loops):
     assert far_apart(result.poses, {scan: first @ log[scan.scan].logged_pose for scan in result.poses})[0] < 0.25
 
 
+@pytest.mark.slow
 def test_wrong_closures_in_a_real_graph(datasets):
     """A hundred wrong closures in a real graph, random and slid along: all are silenced, from no initial poses."""
     graph = read_pose_graph(datasets / "fr079" / "fr079-graph.log.gz")

@@ -71,6 +71,7 @@ def test_a_dense_log_needs_few_keyframes():
     assert turned < math.radians(1.5)
 
 
+@pytest.mark.slow
 def test_two_robots_come_out_as_one_map():
     """Their logs in either order, every scan within 0.25 m and 5 degrees of the truth, and one clean map."""
     maps, true = sample("two-robots", "two-robots-b.log", "two-robots-a.log")
@@ -141,6 +142,7 @@ def test_an_empty_log_is_an_empty_map():
     assert map_scans(alone, PARAMETERS).components == ()
 
 
+@pytest.mark.slow
 def test_a_real_log_hangs_together(datasets):
     """Freiburg 101, every scan without its pose: one component, as its own poses have it."""
     log = read_log(datasets / "fr101" / "freiburg-101-corrected.log.gz")
