@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from clocks import Clock
 
 from app.drawing import draw
 from app.errors import RequestError
@@ -19,15 +20,6 @@ from segmap.integration import match_maps
 from segmap.segments import extract
 
 PATIENCE = 120.0
-
-
-class Clock:
-    """A clock that a test turns."""
-
-    now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 @pytest.fixture

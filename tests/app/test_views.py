@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from clocks import Clock
 
 from app.errors import BusyError, UnknownError
 from app.views import Views
@@ -19,13 +20,6 @@ class Thing:
 
     def close(self) -> None:
         self.closed = True
-
-
-class Clock:
-    now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
+import clocks
 import numpy as np
 import pytest
 
@@ -23,13 +24,8 @@ from segmap.errors import ConflictError, ProjectError, SegmapError
 PATIENCE = 120.0
 
 
-class Clock:
-    """A clock that a test turns."""
-
-    now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
+class Clock(clocks.Clock):
+    """One that waits, too."""
 
     def wait(self) -> None:
         """As long as a person takes to look."""
