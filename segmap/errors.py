@@ -33,7 +33,14 @@ __all__ = [
 
 
 class SegmapError(Exception):
-    """Base of everything segmap raises on purpose; its text is meant for people."""
+    r"""Base of everything segmap raises on purpose; its text, for people, is one printable line whatever it quotes.
+
+    >>> str(SegmapError("There is no scan named \x1b[31m\n."))
+    'There is no scan named �[31m�.'
+    """
+
+    def __str__(self) -> str:
+        return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in super().__str__())
 
 
 class ParameterError(SegmapError):

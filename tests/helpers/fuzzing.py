@@ -15,11 +15,15 @@ from typing import Any
 from bags import ECHOES, ROS_1, ROS_2, SCAN, laser_scan, multi_echo, ranges, texts, write_ros1, write_ros2
 
 from segmap.errors import SegmapError
+from segmap.events import Choice, Decide, Proposal, Propose, Rename, Undo, event_from_json
 from segmap.export import export_map
 from segmap.logs import Limits, read_logs, read_maps, read_pose_graph
 from segmap.logs.tables import read_relations, read_trajectory
 from segmap.merging import Component
+from segmap.pose import Pose2
+from segmap.project import replay
 from segmap.segments import SegmentMap
+from segmap.store import Store
 
 Read = Callable[[bytes], object]
 LIMITS = Limits(size=1 << 26, lines=1_000_000)
@@ -104,6 +108,41 @@ def trajectories() -> dict[str, bytes]:
     return {"TUM": "\n".join(["# a remark", *(f"{i}.5 1 2 0 0 0 0.6 0.8" for i in range(6))]).encode()}
 
 
+def projects() -> dict[str, bytes]:
+    """A small project file, and the events of its history, a line each."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "hall.segmap"
+        with Store.create(path, "hall") as store:
+            kept = store.state.fingerprint
+            store.add_log("hall.log", _texts()["CARMEN"], scans=6, format="CARMEN")
+            proposed = Proposal(integration="0.0-0.3", kind="closure", T_1_2=Pose2(1.0, 0.0, 0.1))
+            store.append(Propose(proposals=(proposed,)))
+            chosen = Choice(integration="0.0-0.1", verdict="accepted", parameters=kept, T_1_2=Pose2(0.1, 0.2, 0.3))
+            store.append(Decide(choices=(chosen,), who="a person", reason="seen"))
+            store.append(Rename(name="the hall"))
+            store.append(Undo())
+            events = store.events()
+        whole = path.read_bytes()
+    return {"project": whole, "history": b"\n".join(event.model_dump_json().encode() for event in events)}
+
+
+def read_project(content: bytes, **_: object) -> tuple[()]:
+    """Open a project file of these bytes, and read its logs."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.segmap"
+        path.write_bytes(content)
+        with Store.open(path) as store:
+            for log in store.state.logs:
+                assert sum(map(len, store.log_chunks(log.index))) <= LIMITS.size
+    return ()
+
+
+def read_history(content: bytes, **_: object) -> tuple[()]:
+    """Replay these lines as the events of a project."""
+    replay(event_from_json(line) for line in content.split(b"\n"))
+    return ()
+
+
 def readers() -> Mapping[str, tuple[Read, bytes]]:
     """Every reader, with a good file of its kind."""
     kinds: tuple[tuple[Any, dict[str, bytes]], ...] = (
@@ -112,6 +151,8 @@ def readers() -> Mapping[str, tuple[Read, bytes]]:
         (read_pose_graph, graphs()),
         (read_relations, relations()),
         (read_trajectory, trajectories()),
+        (read_project, {"project": projects()["project"]}),
+        (read_history, {"history": projects()["history"]}),
     )
     every = ((name, read, good) for read, held in kinds for name, good in held.items())
     return {name: (partial(read, name="a<b>.log", limits=LIMITS), good) for name, read, good in every}
