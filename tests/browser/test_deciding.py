@@ -13,8 +13,6 @@ import pytest
 
 from app.resources import static_folder
 
-pytestmark = pytest.mark.browser
-
 ON_SCREEN = """([name, x, y]) => {
   const viewer = window.__viserMutable, camera = viewer.camera;
   const node = viewer.nodeRefFromName[name];

@@ -6,10 +6,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-pytestmark = pytest.mark.browser
-
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
 
 

@@ -14,8 +14,6 @@ axe_playwright = pytest.importorskip(
     "axe_playwright_python.sync_playwright", reason="pip install axe-playwright-python"
 )
 
-pytestmark = pytest.mark.browser
-
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
 SERIOUS = ("serious", "critical")
 SHEETS = (("#parameters-open", "#parameters-close"), ("#help-open", "#help button"), ("#share", ".share > button"))

@@ -10,8 +10,6 @@ from typing import Any
 import httpx
 import pytest
 
-pytestmark = pytest.mark.browser
-
 ON_SCREEN = """([x, y]) => {
   const viewer = window.__viserMutable, camera = viewer.camera;
   const node = viewer.nodeRefFromName["/map"];

@@ -8,9 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-import pytest
-
-pytestmark = pytest.mark.browser
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
 

@@ -9,8 +9,6 @@ from typing import Any
 
 import pytest
 
-pytestmark = pytest.mark.browser
-
 
 def laser_lines(datasets: Path, first: int, last: int) -> bytes:
     """Some scans of the corrected Intel log."""

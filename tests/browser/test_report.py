@@ -5,10 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-pytestmark = pytest.mark.browser
-
 
 def test_report_from_the_menu(desk: Any, server: Any, chromium: Any, pictures: Path, tmp_path: Path) -> None:
     """It is saved from the export menu, opens offline without a word in the console, and nothing runs off the page."""

@@ -7,8 +7,6 @@ from typing import Any
 
 import pytest
 
-pytestmark = pytest.mark.browser
-
 
 @pytest.fixture(scope="module")
 def project(server: Any) -> str:

@@ -10,8 +10,6 @@ from typing import Any
 import httpx
 import pytest
 
-pytestmark = pytest.mark.browser
-
 FIRST, SECOND = "0067be", "e06000"
 """colours of the two maps on a light background"""
 PAIR = "0.84-0.85"

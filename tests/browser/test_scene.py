@@ -14,8 +14,6 @@ from app.palette import PALETTES, hexadecimal
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-pytestmark = pytest.mark.browser
-
 PATIENCE = 30_000
 """milliseconds"""
 NODE = """(name) => {

@@ -8,9 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-import pytest
-
-pytestmark = pytest.mark.browser
 
 DRAWN = """() => ({
   shapes: [...document.querySelectorAll('.figure .shape')].map((one) => one.outerHTML),

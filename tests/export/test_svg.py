@@ -127,7 +127,6 @@ def test_too_large(part):
             export_map([part("a", (-far, 0.0, far, 0.0))], "svg")
 
 
-@pytest.mark.browser
 def test_in_a_browser(chromium, corner, tmp_path):
     """A browser draws the corner as it is: foot below arm, ink where a line is, paper where none is."""
     (tmp_path / "map.svg").write_bytes(export_map([corner], "svg", {"title": "A corner"}))
