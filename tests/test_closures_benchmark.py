@@ -57,6 +57,7 @@ def test_pairs_beside_each_other_are_one_revisit(script):
     assert len(set(groups)) == 3
 
 
+@pytest.mark.slow
 def test_what_is_found_and_what_is_injected(script, monkeypatch):
     """The search on a sample whose robot comes back: all it accepts is right; every wrong closure is silenced."""
     log = read_log(ROOT / "sample_logs" / "office.log")

@@ -122,6 +122,7 @@ def test_two_pairs_of_segments_lay_the_second_map(maps: tuple[SegmentMap, Segmen
     assert abs(off @ [-math.sin(walls[first[0]]), math.cos(walls[first[0]])]) < 0.02
 
 
+@pytest.mark.slow
 @given(x=st.floats(-20.0, 20.0), y=st.floats(-20.0, 20.0), theta=st.floats(-math.pi, math.pi), flip=st.booleans())
 def test_laying_follows_any_motion(x: float, y: float, theta: float, flip: bool) -> None:
     """Whatever the motion, and whichever way the segments are written: a corner lies on itself again."""

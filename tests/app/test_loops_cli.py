@@ -42,6 +42,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, st
     return int(stopped.value.code or 0), out, err
 
 
+@pytest.mark.slow
 def test_loops_are_found_told_and_kept(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Each is where the scans truly were; they are in the queue afterwards, and undecided; again nothing is new."""
     status, out, err = run(capsys, "loops", project, "--workers", 1, "--json")
@@ -100,6 +101,7 @@ def poses() -> list[list[float]]:
     return list(document["sessions"][0]["poses"])
 
 
+@pytest.mark.slow
 def test_loops_can_leave_the_project_alone(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """With --no-keep nothing is written."""
     with Store.open(project) as store:

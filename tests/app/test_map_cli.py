@@ -51,6 +51,7 @@ def test_two_logs_become_one_map_in_files_others_read(run: Run, tmp_path: Path, 
     assert len(rows) == COUNT
 
 
+@pytest.mark.slow
 def test_without_json_it_tells_a_person(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """How many scans are where, what holds nothing, and what hangs on too little."""
     held = {}

@@ -112,6 +112,7 @@ def test_a_clean_map_has_no_doubles(merged: Callable[..., Any], tmp_path: Path) 
     assert clean["hash"] in (tmp_path / "clean.geojson").read_text()
 
 
+@pytest.mark.slow
 def test_a_tree_of_many_scans_is_refused_or_asked_for(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """n (n - 1) / 2 calls: said with the remedy; at a terminal asked; allowed where it is asked for."""
     needed = COUNT * (COUNT - 1) // 2

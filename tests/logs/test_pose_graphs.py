@@ -217,6 +217,7 @@ def test_imported_edges():
     assert len(imported_edges(graph, {10: ScanId(0, 0), 11: ScanId(0, 1)})) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "vertices", "edges", "loops"), [("intel", 2672, 3901, 1230), ("fr079", 1464, 2307, 844)]
 )

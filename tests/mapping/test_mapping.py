@@ -113,6 +113,7 @@ def test_mapping_can_be_stopped():
         map_scans(maps, PARAMETERS, check=check)
 
 
+@pytest.mark.slow
 def test_mapping_that_was_stopped_goes_on_where_it_was():
     """To the last bit as if it had not been, and no pair is matched twice."""
     maps, _ = sample("office", "office.log")

@@ -32,6 +32,7 @@ def pairs(maps):
     return found
 
 
+@pytest.mark.slow
 def test_two_processes_find_what_one_finds(maps, pairs):
     """In the order of the pairs, to the last bit, with progress told for each."""
     told = []
