@@ -16,10 +16,11 @@ from segmap.parameters import Parameters
 from segmap.pose import Pose2
 from segmap.refinement import refined
 from segmap.scans import ScanId
+from segmap.segments import SegmentMap
 from segmap.spreading import Pair
-from segmap.visibility import Sighting, look
+from segmap.visibility import Sighting, look, sighting, thinned
 
-__all__ = ["Consensus", "voted"]
+__all__ = ["LEAST_VOTES", "Consensus", "sightings", "voted"]
 
 LEAST_VOTES, LEAST_SCORE, LEAST_LEAD = 2, 6.0, 0.1
 """pairs that must agree, the metres all must score together, and the share of it they must be ahead of any rival"""
@@ -31,6 +32,8 @@ MOST_JUDGED = 10
 """clusters that are judged by lines of sight"""
 SEVERITIES = np.array([2.0, 4.0])
 """what a metre against takes from the metres supported: mildly and severely judged, the best must be the best"""
+RETURNS = 90
+"""returns of each scan that judge what is voted for"""
 JOINT_STEPS, JOINT_GATES = 4, (0.3, 0.1)
 """steps of refinement of each pair, and the gates in metres it begins and ends with"""
 
@@ -63,6 +66,11 @@ class Consensus:
     def clear(self) -> bool:
         """Whether enough speaks for it, and for nothing else."""
         return len(self.votes) >= self.needed and self.score >= LEAST_SCORE and self.lead >= LEAST_LEAD
+
+
+def sightings(maps: Mapping[ScanId, SegmentMap], scans: Iterable[ScanId]) -> dict[ScanId, Sighting]:
+    """What scans saw, some returns of each; those that saw something."""
+    return {scan: thinned(seen, RETURNS) for scan in scans if (seen := sighting(maps[scan])) is not None}
 
 
 def voted(
@@ -126,11 +134,13 @@ def _votes(
 ) -> Iterator[Vote]:
     for a, T_1_a in group_1.items():
         for b, T_2_b in group_2.items():
-            match = matches.get((a, b))
+            pair = (a, b) if a < b else (b, a)
+            match = matches.get(pair)
             for rank, candidate in enumerate(match.ranked[:CANDIDATES] if match else ()):
-                T_1_2 = T_1_a @ candidate.T_1_2 @ T_2_b.inverse()
+                T_a_b = candidate.T_1_2 if a < b else candidate.T_1_2.inverse()
+                T_1_2 = T_1_a @ T_a_b @ T_2_b.inverse()
                 if allowed(T_1_2):
-                    yield Vote(max(0.0, candidate.score or 0.0), T_1_2, (a, b), rank)
+                    yield Vote(max(0.0, candidate.score or 0.0), T_1_2, pair, rank)
 
 
 def _one_each(votes: Iterable[Vote]) -> tuple[Vote, ...]:

@@ -6,13 +6,13 @@ fails, and half-way between two such failures another keyframe is put, so that e
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 from joblib import delayed
 
-from segmap.consensus import Consensus, voted
+from segmap.consensus import Consensus, sightings, voted
 from segmap.integration import Match, Verdict, match_maps
 from segmap.links import (
     SIDE,
@@ -29,7 +29,6 @@ from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 from segmap.spreading import Crew, Matches, Pair
-from segmap.visibility import Sighting, sighting, thinned
 
 __all__ = ["Chain", "chained", "keyframes", "windows"]
 
@@ -39,8 +38,6 @@ WINDOW = 3
 """keyframes before it that each keyframe is matched with"""
 HALVED = 3
 """scans between two keyframes from which on one is put half-way"""
-RETURNS = 90
-"""returns of each scan that judge what is voted for"""
 FASTER_TURN = 0.5
 """share of the score of a faster turn below which what is in pace is given up for it"""
 FEW = 3
@@ -199,15 +196,10 @@ def _across(
 
     A faster turn is believed where nothing in pace fits half as well.
     """
-    seen, steps = _sightings(maps, (*before, *after)), steps_between((ends[0], ends[1]))
+    seen, steps = sightings(maps, (*before, *after)), steps_between((ends[0], ends[1]))
     paced = voted(before, after, matches, seen, parameters, lambda T: pace.allows(T, steps))
     anyhow = voted(before, after, matches, seen, parameters, lambda T: pace.reaches(T, steps))
     fits = 0.0 if paced is None else paced.score
     if anyhow is not None and anyhow.clear and fits < FASTER_TURN * anyhow.score:
         return anyhow
     return paced if paced is not None and paced.clear else None
-
-
-def _sightings(maps: Mapping[ScanId, SegmentMap], scans: Iterable[ScanId]) -> dict[ScanId, Sighting]:
-    """What scans saw, those that saw something."""
-    return {scan: thinned(seen, RETURNS) for scan in scans if (seen := sighting(maps[scan])) is not None}

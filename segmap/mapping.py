@@ -33,6 +33,7 @@ from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 from segmap.spreading import Crew, Keep, Matches, Pair, Told
+from segmap.strays import placed, strays
 
 __all__ = ["WholeMap", "fused", "map_scans"]
 
@@ -145,6 +146,19 @@ def _close_loops(task: _Task, keys: Sequence[ScanId], links: dict[Pair, Link], m
         if not closures and not joined:
             break
         optimised = optimise([link.edge for link in links.values()], check=task.crew.check)
+    for _ in range(ROUNDS):
+        if not (holding := _placed(task, scene, optimised, matches)):
+            break
+        links.update((link.pair, link) for link in holding)
+        optimised = optimise([link.edge for link in links.values()], check=task.crew.check)
+
+
+def _placed(task: _Task, scene: Scene, optimised: Optimised, matches: Matches) -> list[Link]:
+    """Links that hold what stands alone beside a larger component in its log, the largest first."""
+    links: list[Link] = []
+    for stray in strays(scene.scans, optimised.components):
+        links.extend(placed(stray, task.crew, optimised.poses, task.paces, matches))
+    return links
 
 
 def _sound(optimised: Optimised, links: Mapping[Pair, Link]) -> list[Link]:

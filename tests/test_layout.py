@@ -55,6 +55,7 @@ ORDER = (
     "consensus",
     "keyframes",
     "loops",
+    "strays",
     "holding",
     "mapping",
     "revisits",
