@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,13 +25,17 @@ class Change:
 
 def changed(before: ProjectState, after: ProjectState) -> tuple[str, ...]:
     """The integrations whose decision or proposal is another one, in order."""
-    names = {*before.decisions, *after.decisions, *before.proposals, *after.proposals}
-    different = [IntegrationId.parse(name) for name in names if _of(before, name) != _of(after, name)]
-    return tuple(str(integration) for integration in sorted(different))
+    names = {*_different(before.decisions, after.decisions), *_different(before.proposals, after.proposals)}
+    return tuple(map(str, sorted(map(IntegrationId.parse, names))))
 
 
-def _of(state: ProjectState, name: str) -> tuple[object, object]:
-    return state.decisions.get(name), state.proposals.get(name)
+def _different(before: Mapping[str, object], after: Mapping[str, object]) -> Iterator[str]:
+    """The names under which there is something else."""
+    for name, one in after.items():
+        held = before.get(name)
+        if held is not one and held != one:
+            yield name
+    yield from before.keys() - after.keys()
 
 
 def is_accepted(state: ProjectState, integration: str) -> bool:

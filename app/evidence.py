@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from app.claims import NUDGED
 from app.content import Content, Pair, Tie
 from app.drawing import LAYERS_OF
+from app.listing import Listed
 from app.looks import Looks
 from app.map_looks import MapContent
 from app.review import Row
@@ -30,6 +31,8 @@ __all__ = ["Evidence", "scan_name"]
 
 KEPT = 64
 """candidates whose chains are remembered"""
+QUEUES = 4
+"""queues whose ties are remembered"""
 SAME_POSE = 1e-6
 """metres, radians"""
 
@@ -39,6 +42,12 @@ def scan_name(scan: ScanId, state: ProjectState) -> str:
     if len(state.logs) < 2:
         return f"scan {scan.scan}"
     return f"{state.logs[scan.log].name}, scan {scan.scan}"
+
+
+@lru_cache(QUEUES)
+def _ties(listed: Listed) -> tuple[Tie, ...]:
+    """The lines of the map; the same object for the same queue, whoever looks at it."""
+    return tuple(map(_tie, filter(_is_tie, listed.rows)))
 
 
 def _is_tie(row: Row) -> bool:
@@ -92,7 +101,7 @@ class Evidence:
             stage=looks.stage,
             pair=pair,
             components=tuple(self._session.components()) if looks.stage == "map" else (),
-            ties=tuple(map(_tie, filter(_is_tie, self._session.rows()))) if looks.stage == "map" else (),
+            ties=_ties(self._session.listed) if looks.stage == "map" else (),
             scans=len(self._session.scan_ids),
             dimension=looks.dimension,
             theme=looks.theme,

@@ -46,6 +46,10 @@ def remember(results: ResultStore, info: LogInfo, facts: Facts) -> None:
         results.put_result(_key(info), json.dumps([facts.no_return, facts.problems]))
 
 
+def _scan_ids(logs: Sequence[LogInfo]) -> tuple[ScanId, ...]:
+    return tuple(ScanId(info.index, i) for info in logs for i in range(info.scans))
+
+
 def _key(info: LogInfo) -> str:
     return f"log/{info.sha256}{info.topic}"
 
@@ -61,6 +65,7 @@ class Inputs:
         known: Mapping[int, LaserLog] | None = None,
     ) -> None:
         self._results, self._infos, self._bytes = results, tuple(logs), log_bytes
+        self._scan_ids = _scan_ids(self._infos)
         self._logs: dict[int, LaserLog] = dict(known or {})
         self._reading = threading.Lock()
         self._lock = threading.Lock()
@@ -70,13 +75,13 @@ class Inputs:
     @property
     def scan_ids(self) -> tuple[ScanId, ...]:
         """All scans of all logs, in order."""
-        return tuple(ScanId(info.index, i) for info in self._infos for i in range(info.scans))
+        return self._scan_ids
 
     def add(self, logs: Sequence[LogInfo], known: Mapping[int, LaserLog]) -> None:
         """Take in logs that were added to the project; ``logs`` are all it has now."""
         with self._reading:
             self._logs.update(known)
-            self._infos = tuple(logs)
+            self._infos, self._scan_ids = tuple(logs), _scan_ids(logs)
 
     def log(self, index: int) -> LaserLog:
         """A log of the project.

@@ -6,7 +6,7 @@ import math
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 from app.jobs import Check, Latest
@@ -17,21 +17,22 @@ from segmap.graph import (
     Edge,
     Loop,
     Optimised,
+    Part,
     Preview,
     Residual,
     Strength,
-    Ways,
     explain,
     loop_of,
     optimise,
     preview,
-    strength,
+    strength_of,
 )
 from segmap.merging import Accepted
 from segmap.pose import Pose2
 from segmap.project import ProjectState
+from segmap.scans import ScanId
 
-__all__ = ["Graph", "PoseGraph", "Solver", "edge", "edges_of", "graph_of", "placed"]
+__all__ = ["Firmness", "Graph", "PoseGraph", "Solver", "edge", "edges_of", "graph_of", "placed"]
 
 DEVIATION = 0.1, math.radians(2.0)
 """metres and radians; what is taken for a pose nobody says how well it is known"""
@@ -42,6 +43,8 @@ UNTOLD: Covariance = (
 )
 
 
+EDGES = 16_384
+"""that are remembered"""
 LOOPS = 12
 """loops of each component that are looked at for the one that misses itself most"""
 FAR_OFF = 0.4
@@ -49,8 +52,9 @@ FAR_OFF = 0.4
 right closures of public logs are at most 0.34 m off"""
 
 
+@lru_cache(EDGES)
 def edge(integration: str, T_1_2: Pose2, covariance: Covariance | None) -> Edge:
-    """An integration as an edge of the graph."""
+    """An integration as an edge of the graph; the same object for the same, as edges are compared again and again."""
     pair = IntegrationId.parse(integration)
     return Edge(pair.first, pair.second, T_1_2, covariance or UNTOLD)
 
@@ -84,7 +88,9 @@ def placed(edges: tuple[Edge, ...], optimised: Optimised) -> tuple[Accepted, ...
 
 
 class Solver:
-    """Optimises edges, and remembers the last result: the graph and the merged map ask for the same. Thread-safe."""
+    """Optimises edges, and remembers the last result: the graph and the merged map ask for the same, and of what comes
+    next only the components that changed are optimised. Thread-safe.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -94,7 +100,8 @@ class Solver:
         """The poses that fit the edges best; the same for the same edges."""
         with self._lock:
             if self._held is None or self._held[0] != edges:
-                self._held = edges, optimise(edges, most=FAR_OFF, check=check)
+                before = self._held[1] if self._held else None
+                self._held = edges, optimise(edges, most=FAR_OFF, known=before, check=check)
             return self._held[1]
 
 
@@ -105,7 +112,7 @@ class Graph:
     revision: int
     edges: tuple[Edge, ...]
     optimised: Optimised
-    strengths: tuple[Strength, ...]
+    firmness: tuple[Firmness, ...]
     """of every component"""
 
     @cached_property
@@ -113,43 +120,32 @@ class Graph:
         """How each accepted integration fares, by name."""
         return {residual.edge.name: residual for residual in self.optimised.residuals}
 
-    @cached_property
-    def _ways(self) -> Ways:
-        return self.optimised.ways()
-
-    @cached_property
-    def loops(self) -> tuple[Loop | None, ...]:
-        """Of each component the loop that misses itself most, of those that the integrations farthest off close."""
-        return tuple(self._worst(number) for number in range(len(self.optimised.components)))
-
-    def _worst(self, component: int) -> Loop | None:
-        held = {id(edge) for edge in self.optimised.counting(component)}
-        those = [r for r in self.optimised.residuals if id(r.edge) in held and not _follow(r.edge)]
-        asked = sorted(those, key=lambda residual: -residual.translation)[:LOOPS]
-        found = [loop for residual in asked if (loop := loop_of(residual.edge, self._ways)) is not None]
-        return max(found, key=lambda loop: loop.translation, default=None)
-
     def fate(self, integration: str, T_1_2: Pose2 | None) -> Fate | None:
         """How far a pose of an integration is from where the graph has it; None where the graph says nothing."""
         held = self.residuals.get(integration)
         if held is not None and held.edge.T_1_2 == T_1_2:
             return Fate(held.translation, held.rotation, held.chi, held.silenced)
         pair = IntegrationId.parse(integration)
-        part = self.optimised.component_of(pair.first)
-        if T_1_2 is None or part is None or part != self.optimised.component_of(pair.second):
+        part = self.part(*pair)
+        if T_1_2 is None or part is None:
             return None
-        poses = self.optimised.poses
-        return Fate(*T_1_2.distance(poses[pair.first].inverse() @ poses[pair.second]))
+        return Fate(*T_1_2.distance(part.poses[pair.first].inverse() @ part.poses[pair.second]))
+
+    def part(self, first: ScanId, second: ScanId) -> Part | None:
+        """The component that holds both scans: all that the graph says of the two depends on it alone."""
+        found = self.optimised.part_of(first)
+        return found if found is not None and second in found.poses else None
 
     def explained(self, integration: str) -> tuple[str, ...]:
         """What the graph says of an accepted integration, in words; nothing of others."""
         residual = self.residuals.get(integration)
-        return () if residual is None else explain(self.optimised, residual, self._ways)
+        part = None if residual is None else self.optimised.part_of(residual.edge.first)
+        return () if residual is None or part is None else explain(self.optimised, residual, part.ways)
 
     def preview(self, candidate: Edge) -> Preview:
         """What would come of accepting one more integration, or of this one at another pose."""
         others = tuple(one for one in self.edges if one.name != candidate.name)
-        return preview(others, candidate, self.optimised if len(others) == len(self.edges) else None, most=FAR_OFF)
+        return preview(others, candidate, self.optimised, most=FAR_OFF)
 
     def to_json(self) -> dict[str, Any]:
         """As the pages get it: strength by component, and what is silenced, in words."""
@@ -158,7 +154,7 @@ class Graph:
             "revision": self.revision,
             "edges": len(self.edges),
             "silenced": silenced,
-            "strengths": [_strength(*one) for one in zip(self.strengths, self.loops, strict=True)],
+            "strengths": [one.to_json() for one in self.firmness],
         }
 
 
@@ -166,29 +162,51 @@ def _follow(one: Edge) -> bool:
     return are_neighbours(min(one.first, one.second), max(one.first, one.second))
 
 
-def _strength(one: Strength, worst: Loop | None) -> dict[str, Any]:
-    return {
-        "loop": worst.edge.name if worst else None,
-        "loop_scans": len(worst.scans) if worst else 0,
-        "loop_error": worst.translation if worst else None,
-        "loop_turn": worst.rotation if worst else None,
-        "first": str(one.scans[0]),
-        "scans": len(one.scans),
-        "edges": one.edges,
-        "bridges": [bridge.name for bridge in one.bridges],
-        "hanging": len(one.hanging),
-        "cut": [cut.name for cut in one.cut],
-        "cut_off": len(one.cut_off),
-        "softest": str(one.softest),
-        "deviation": one.deviation,
-    }
+@dataclass(frozen=True, eq=False)
+class Firmness:
+    """How firmly a component holds together."""
+
+    part: Part
+    strength: Strength
+    loop: Loop | None
+    """the one that misses itself most, of those that the integrations farthest off close"""
+
+    @classmethod
+    def of(cls, part: Part) -> Firmness:
+        """The firmness of a component."""
+        counting = (one for one in part.residuals if not one.silenced and not _follow(one.edge))
+        asked = sorted(counting, key=lambda residual: -residual.translation)[:LOOPS]
+        found = [loop for residual in asked if (loop := loop_of(residual.edge, part.ways)) is not None]
+        return cls(part, strength_of(part), max(found, key=lambda loop: loop.translation, default=None))
+
+    def to_json(self) -> dict[str, Any]:
+        """As the pages get it."""
+        held, worst = self.strength, self.loop
+        return {
+            "loop": worst.edge.name if worst else None,
+            "loop_scans": len(worst.scans) if worst else 0,
+            "loop_error": worst.translation if worst else None,
+            "loop_turn": worst.rotation if worst else None,
+            "first": str(held.scans[0]),
+            "scans": len(held.scans),
+            "edges": held.edges,
+            "bridges": [bridge.name for bridge in held.bridges],
+            "hanging": len(held.hanging),
+            "cut": [cut.name for cut in held.cut],
+            "cut_off": len(held.cut_off),
+            "softest": str(held.softest),
+            "deviation": held.deviation,
+        }
 
 
-def graph_of(state: ProjectState, solve: Solver, check: Check | None = None) -> Graph:
-    """The graph of everything accepted in a project."""
+def graph_of(state: ProjectState, solve: Solver, check: Check | None = None, before: Graph | None = None) -> Graph:
+    """The graph of everything accepted in a project; of the one ``before`` what did not change is taken."""
     edges = edges_of(state)
     optimised = solve(edges, check)
-    return Graph(state.revision, edges, optimised, strength(optimised))
+    held = {one.part: one for one in before.firmness} if before else {}
+    return Graph(
+        state.revision, edges, optimised, tuple(held.get(part) or Firmness.of(part) for part in optimised.parts)
+    )
 
 
 class PoseGraph:
@@ -206,5 +224,5 @@ class PoseGraph:
         return self._latest.busy
 
     def _optimise(self, check: Check) -> None:
-        self.current = graph_of(self._state(), self._solve, check)
+        self.current = graph_of(self._state(), self._solve, check, self.current)
         self._done()

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from app.criterion import CRITERIA, Criterion
 from app.later import Later
+from app.listing import Listed, Listing
 from app.loops import Loops
 from app.matching import Matching
 from app.queue_text import QueueText, QueueTexts
-from app.review import Flips, Row, Rows, counts, flips, queue
+from app.review import Flips, Key, Row, Rows, flips, order
+from segmap.graph import Part
 from segmap.project import ProjectState
 
 __all__ = ["Queueing"]
@@ -29,9 +31,11 @@ class Queueing(ABC):
     _rows: Rows
     _later: Later
     _texts: QueueTexts
-    _version = 0
-    """of the rows: another one after every change"""
-    _queue: tuple[int, tuple[Row, ...]] = (-1, ())
+    _listing: Listing
+    _stale: set[str] | None = None
+    """integrations whose rows may be others now; None: all, and the order too"""
+    _parts: frozenset[Part] = frozenset()
+    """the components of the graph that the rows are of"""
 
     @abstractmethod
     def _checked(self, integration: str) -> str: ...
@@ -48,31 +52,35 @@ class Queueing(ABC):
     def put_off(self, integration: str) -> None:
         """Skip an integration for now: in the queue it comes after the others that wait. Nothing is decided."""
         if self._later.add(self._checked(integration)):
-            self._resort()
+            self._resort([integration])
             self._tell_all({"type": "later", "rows": [self.row(integration).to_json()]})
 
     def rows(self) -> list[Row]:
         """The review queue, the integration that most needs a person first."""
-        return list(self._ordered())
+        return list(self.listed.rows)
 
     def queue_text(self) -> QueueText:
         """The same as the pages get it."""
-        return self._texts.of(self._ordered())
+        return self._texts.of(self.listed.rows)
 
-    def _ordered(self) -> tuple[Row, ...]:
-        """The same tuple as long as it holds the same rows."""
+    @property
+    def listed(self) -> Listed:
+        """The queue as it is now; the same object as long as it is the same."""
         with self._lock:
-            version, held = self._queue
-            if version != self._version:
-                state, version = self._state, self._version
-                found = tuple(queue(map(self.row, self._integrations), state.mode, state.parameters))
-                held = held if found == held else found
-                self._queue = (version, held)
-            return held
+            stale, held = self._stale, self._listing
+            if stale is None:
+                held.replace(map(self.row, self._integrations), self._order())
+            elif stale:
+                held.update(map(self.row, stale & held.now.places.keys()), self._order())
+            self._stale = set()
+            return held.now
+
+    def _order(self) -> Callable[[Row], Key]:
+        return order(self._state.mode, self._state.parameters)
 
     def counts(self) -> Mapping[str, int]:
         """How many integrations there are, in all and in each state."""
-        return counts(self._ordered())
+        return self.listed.counts
 
     @property
     def criterion(self) -> Criterion:
@@ -85,13 +93,28 @@ class Queueing(ABC):
         Raises:
             ParameterError: it is out of bounds.
         """
-        state = self._state
-        parameters = self.criterion.moved(state.parameters, value)
-        pending = [row for row in self._ordered() if row.state == "pending"]
+        state, criterion = self._state, self.criterion
+        parameters = criterion.moved(state.parameters, value)
+        low, high = sorted((value, criterion.threshold(state.parameters)))
+        pending = [row for row in self.listed.rows if row.state == "pending" and _between(low, criterion.of(row), high)]
         found = (self._matching.outcome(row.id, state.heuristic) for row in pending)
         moved = (self._rows.moved(row, state, one, parameters) for row, one in zip(pending, found, strict=True))
         return flips(pending, moved)
 
-    def _resort(self) -> None:
+    def _resort(self, integrations: Iterable[str] | None = None) -> None:
+        """The rows of these may be others now; None: of all, or there are others."""
         with self._lock:
-            self._version += 1
+            self._stale = None if self._stale is None or integrations is None else self._stale.union(integrations)
+
+    def _regraph(self) -> None:
+        """The same after the graph was optimised: of what was, or now is, in components that changed."""
+        with self._lock:
+            parts, held = frozenset(self.loops.graph.optimised.parts), self._parts
+            moved = {scan for part in parts ^ held for scan in part.scans}
+            self._parts = parts
+            self._resort(row.id for row in self._listing.now.rows if row.first in moved or row.second in moved)
+
+
+def _between(low: float, quantity: float | None, high: float) -> bool:
+    """Whether moving a threshold from one to the other can matter to what has this quantity; to others it cannot."""
+    return quantity is None or low <= quantity <= high

@@ -43,7 +43,7 @@ class Reporter:
             state=state,
             pairs=tuple(self._pair(name, state) for name in integrations_of(state, known)),
             optimised=graph.optimised,
-            strengths=graph.strengths,
+            strengths=tuple(one.strength for one in graph.firmness),
             logs=tuple(self._log(state, index) for index in range(len(state.logs))),
             scans=known,
             map_of=lambda scan: self._extract(scan, state.parameters),

@@ -5,6 +5,7 @@ The folders lie beside the packages in a checkout and inside ``app`` when instal
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -23,6 +24,7 @@ def samples_folder() -> Path:
     return _folder("sample_logs")
 
 
+@cache
 def program_version() -> str:
     """The version of segmap; ``unknown`` where it runs without being installed."""
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeAlias
 
@@ -19,7 +19,7 @@ from segmap.project import ProjectState
 from segmap.scans import ScanId
 from segmap.verdict import Findings, judge
 
-__all__ = ["Fate", "Fates", "Flips", "Outcome", "Row", "Rows", "counts", "flips", "queue", "row"]
+__all__ = ["Fate", "Fates", "Flips", "Key", "Outcome", "Row", "Rows", "counts", "flips", "order", "queue", "row"]
 
 STATES = ("pending", "failed", "none", "matching", "accepted", "rejected")
 """In queue order: what a person can decide, what a person should know, what is not ready, what is done."""
@@ -148,10 +148,15 @@ def row(blank: Row, heuristic: str, outcome: Outcome | None, decision: Decision 
 class Fates(Protocol):
     """What knows how far an integration is from where the graph has it."""
 
+    def part(self, first: ScanId, second: ScanId) -> object:
+        """What that depends on; the same object as long as it is the same."""
+
     def fate(self, integration: str, T_1_2: Pose2 | None) -> Fate | None: ...
 
 
-_Grounds: TypeAlias = tuple[Outcome | None, Decision | None, Proposal | None, tuple[Any, ...], Fates | None, bool]
+Key: TypeAlias = tuple[int, bool, bool, float, ScanId, ScanId]
+"""of a row in the order of review"""
+_Grounds: TypeAlias = tuple[Outcome | None, Decision | None, Proposal | None, tuple[Any, ...], object, bool]
 
 
 def _identical(held: _Grounds, now: _Grounds) -> bool:
@@ -186,7 +191,9 @@ class Rows:
     ) -> Row:
         """The row of an integration in a state of the project; one that shows the same is the same object."""
         decision, proposal = state.decisions.get(integration), state.proposals.get(integration)
-        grounds = outcome, decision, proposal, self._current(state), graph, later
+        blank = self._blank[integration]
+        part = None if graph is None else graph.part(blank.first, blank.second)
+        grounds = outcome, decision, proposal, self._current(state), part, later
         held = self._made.get(integration)
         if held and _identical(held[0], grounds):
             return held[1]
@@ -285,9 +292,14 @@ def _same(pose: Pose2 | None, other: tuple[float, float, float] | None) -> bool:
 
 def queue(rows: Iterable[Row], mode: str, parameters: Parameters) -> list[Row]:
     """Rows in the order of review: first what the program leaves to a person, and the closest to the threshold."""
+    return sorted(rows, key=order(mode, parameters))
+
+
+def order(mode: str, parameters: Parameters) -> Callable[[Row], Key]:
+    """The key of that order: another one for every row."""
     criterion = CRITERIA[mode]
     threshold = criterion.threshold(parameters)
-    return sorted(rows, key=lambda r: (*_need(r), _clarity(r, criterion, threshold), r.first, r.second))
+    return lambda r: (*_need(r), _clarity(r, criterion, threshold), r.first, r.second)
 
 
 def _need(r: Row) -> tuple[int, bool, bool]:

@@ -17,6 +17,7 @@ from app.inputs import Facts, Inputs
 from app.jobs import Check, WarmUp
 from app.later import Later
 from app.listeners import Listener, Listeners
+from app.listing import Listing
 from app.loops import Loops
 from app.matching import Matching, Progress, Settings
 from app.merged import Extractor, Merged, MergedMap, map_parameters
@@ -69,7 +70,7 @@ class Session(Steps, Queueing):
         self.extractor: Extractor = self._inputs.segment_map
         """the segments of a scan under any parameters"""
         self._pairs, self._integrations = Pairs(), tuple[str, ...]()
-        self._rows = Rows(())
+        self._rows, self._listing = Rows(()), Listing()
         self._later, self._texts = Later(store), QueueTexts()
         self._matching = Matching(
             store,
@@ -223,7 +224,9 @@ class Session(Steps, Queueing):
 
     def record(self) -> Record:
         """All a report tells beside the map: decisions, evidence, the pose graph of what is accepted now."""
-        return self._reporter.record(self._state, graph_of(self._state, self._solve), self.scan_ids)
+        return self._reporter.record(
+            self._state, graph_of(self._state, self._solve, before=self.loops.graph), self.scan_ids
+        )
 
     # --- listening, and the end -------------------------------------------------------------------
 
@@ -304,7 +307,7 @@ class Session(Steps, Queueing):
         if self._state.logs != before.logs:
             self._inputs.add(self._state.logs, {})
         change = Change(self._state, changed(before, self._state))
-        self._version += 1
+        self._resort(change.integrations if settings_of(before) == settings_of(self._state) else None)
         self._later.discard(name for name in change.integrations if name in self._state.decisions)
         self._follow(change, before)
         return change
@@ -312,8 +315,11 @@ class Session(Steps, Queueing):
     def _follow(self, change: Change, before: ProjectState) -> None:
         """Let the matches and the merged map be those of a state."""
         state = change.state
-        self._integrations = self._pairs.of(state, self._inputs.scan_ids)
-        self._rows.add(self._integrations)
+        integrations = self._pairs.of(state, self._inputs.scan_ids)
+        if integrations is not self._integrations:
+            self._integrations = integrations
+            self._rows.add(integrations)
+            self._resort()
         self._matching.use(Settings(state.parameters, state.mode), state.heuristic, self._integrations)
         placed = any(is_accepted(s, name) for s in (before, state) for name in change.integrations)
         if placed:
@@ -344,7 +350,7 @@ class Session(Steps, Queueing):
             self._warm_up.wait(check)
 
     def _matched(self, integration: str, heuristic: str) -> None:
-        self._resort()
+        self._resort([integration])
         row = self.row(integration).to_json()
         self._tell({"type": "match", "integration": integration, "heuristic": heuristic, "row": row})
 
@@ -355,7 +361,7 @@ class Session(Steps, Queueing):
         self._tell({"type": "map", "revision": merged.revision, "hash": merged.hash})
 
     def _optimised(self) -> None:
-        self._resort()
+        self._regraph()
         self._tell({"type": "graph", "revision": self.loops.graph.revision})
 
     def _take_closures(self, found: Found) -> str:

@@ -127,9 +127,10 @@ def _layer(layer: Layer) -> dict[str, Any]:
 
 def _queue(session: Session, looks: Looks) -> dict[str, Any]:
     """Where the selection stands in the review queue, from 1, and how many still wait for a person."""
-    rows = session.rows()
-    place = next((place for place, row in enumerate(rows, 1) if row.id == looks.integration), None)
-    return {"place": place, "total": len(rows), "pending": sum(row.state == "pending" for row in rows)}
+    listed = session.listed
+    place = listed.places.get(looks.integration or "")
+    counted = {name: listed.counts[name] for name in ("total", "pending")}
+    return {"place": None if place is None else place + 1, **counted}
 
 
 def _candidate(content: Content) -> dict[str, Any]:

@@ -9,10 +9,10 @@ from __future__ import annotations
 from segmap.graph.edges import SOURCES, Covariance, Edge, components
 from segmap.graph.importing import imported_edges
 from segmap.graph.marginals import Marginals, Softness
-from segmap.graph.optimised import Iteration, Optimised, Residual
+from segmap.graph.optimised import Iteration, Optimised, Part, Residual
 from segmap.graph.optimising import BACKENDS, GATE, optimise
 from segmap.graph.previewing import Preview, Shift, preview
-from segmap.graph.strength import Strength, strength
+from segmap.graph.strength import Strength, strength, strength_of
 from segmap.graph.ways import Loop, Ways, loop_of
 from segmap.graph.words import explain
 
@@ -26,6 +26,7 @@ __all__ = [
     "Loop",
     "Marginals",
     "Optimised",
+    "Part",
     "Preview",
     "Residual",
     "Shift",
@@ -39,4 +40,5 @@ __all__ = [
     "optimise",
     "preview",
     "strength",
+    "strength_of",
 ]

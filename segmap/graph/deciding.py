@@ -38,15 +38,16 @@ def decided(
     if not len(problem.free):
         return _plain(problem, minimise)
     every = np.ones(len(problem.edges))
-    agreed = minimise(problem.starts[0], every, FIRST_STEPS)
+    first = problem.starts[0]()
+    agreed = minimise(first, every, FIRST_STEPS)
     if (problem.edges.squares(agreed) <= problem.gate**2).all():
         problem.tell(Round(problem.loss(agreed), 0, agreed))
         return _within(problem, minimise(agreed, every, STEPS), every, minimise)
-    found = _both(problem, problem.starts[0], minimise, begin)
+    found = _both(problem, first, minimise, begin)
     bearable = MANY * len(problem.free) if problem.given else 0.0
     for start in problem.starts[1:]:
         if min(_silenced(weights) for _, weights in found) > bearable:
-            found += _both(problem, start, minimise, begin)
+            found += _both(problem, start(), minimise, begin)
     poses, weights = min(found, key=lambda one: problem.cost(*one))
     return _within(problem, *_heard(problem, minimise(poses, weights, STEPS), weights, minimise), minimise)
 
@@ -108,7 +109,7 @@ def _plain(problem: Problem, minimise: Minimise) -> tuple[FloatArray, FloatArray
     """Where every edge counts."""
     every, found = np.ones(len(problem.edges)), []
     for start in problem.starts:
-        poses = minimise(start, every, STEPS)
+        poses = minimise(start(), every, STEPS)
         found.append(poses)
         problem.tell(Round(problem.loss(poses), 0, poses))
         if (problem.edges.squares(poses) <= FINE**2).all():

@@ -13,11 +13,12 @@ from segmap.errors import GraphError
 from segmap.graph.arrays import EdgeArrays
 from segmap.graph.edges import Edge
 from segmap.graph.marginals import Marginals
+from segmap.graph.robust import Round
 from segmap.graph.ways import Ways
 from segmap.pose import FloatArray, Pose2
 from segmap.scans import ScanId
 
-__all__ = ["HALF", "Iteration", "Optimised", "Residual"]
+__all__ = ["HALF", "Iteration", "Optimised", "Part", "Residual"]
 
 HALF = 0.5
 """an edge with a smaller weight is silenced"""
@@ -58,22 +59,68 @@ class Iteration:
 
 
 @dataclass(frozen=True, eq=False)
+class Part:
+    """A component by itself. It depends on its own edges alone, so that later results hold the same object."""
+
+    scans: tuple[ScanId, ...]
+    """ascending; the first is the frame"""
+    edges: tuple[Edge, ...]
+    poses: Mapping[ScanId, Pose2]
+    residuals: tuple[Residual, ...]
+    """in the order of the edges"""
+    rounds: tuple[Round, ...] = field(repr=False)
+    given: bool
+    """whether poses were given where the search began"""
+    agreed: bool
+    """whether edges that could be silenced all agreed at once: nothing else was looked for"""
+
+    @cached_property
+    def counting(self) -> tuple[Edge, ...]:
+        """The edges that are not silenced."""
+        return tuple(one.edge for one in self.residuals if not one.silenced)
+
+    @cached_property
+    def ways(self) -> Ways:
+        """The net of the edges that count."""
+        return Ways(self.counting)
+
+    @cached_property
+    def marginals(self) -> Marginals:
+        """Covariances within the component."""
+        arrays = EdgeArrays.of(self.counting, {scan: i for i, scan in enumerate(self.scans)})
+        return Marginals(arrays, np.array([tuple(self.poses[scan]) for scan in self.scans]))
+
+
+@dataclass(frozen=True, eq=False)
 class Optimised:
     """The poses that fit the edges best."""
 
-    poses: Mapping[ScanId, Pose2]
-    """``T_first_scan`` of every scan an edge holds, in the frame of the first scan of its component"""
-    components: tuple[tuple[ScanId, ...], ...]
-    """each ascending; its first scan is the frame"""
+    parts: tuple[Part, ...]
+    """the components, by their first scans"""
     residuals: tuple[Residual, ...]
     """in the order of the edges"""
-    history: tuple[Iteration, ...] = field(repr=False)
     gate: float
     """standard deviations beyond which an edge that is not trusted was silenced; infinite where none could be"""
     backend: str
     """``scipy`` or ``gtsam``"""
     most: float = math.inf
     """metres beyond which such an edge was silenced, however little it claims to know"""
+
+    @cached_property
+    def poses(self) -> Mapping[ScanId, Pose2]:
+        """``T_first_scan`` of every scan an edge holds, in the frame of the first scan of its component."""
+        return {scan: pose for part in self.parts for scan, pose in part.poses.items()}
+
+    @property
+    def components(self) -> tuple[tuple[ScanId, ...], ...]:
+        """Each ascending; its first scan is the frame."""
+        return tuple(part.scans for part in self.parts)
+
+    @property
+    def history(self) -> tuple[Iteration, ...]:
+        """What the optimiser did, one component after the other."""
+        rounds = ((number, one) for number, part in enumerate(self.parts) for one in part.rounds)
+        return tuple(Iteration(number, one.error, one.silenced, one.poses) for number, one in rounds)
 
     @property
     def error(self) -> float:
@@ -100,13 +147,18 @@ class Optimised:
         """The number of the component that holds a scan; None where no edge does."""
         return self._numbers.get(scan)
 
+    def part_of(self, scan: ScanId) -> Part | None:
+        """The component that holds a scan; None where no edge does."""
+        number = self._numbers.get(scan)
+        return None if number is None else self.parts[number]
+
     def counting(self, component: int) -> tuple[Edge, ...]:
         """The edges of a component, by its number, that are not silenced."""
-        return self._counting[component]
+        return self.parts[component].counting
 
     def ways(self) -> Ways:
         """The net of the edges that count."""
-        return Ways(edge for edges in self._counting for edge in edges)
+        return Ways(edge for part in self.parts for edge in part.counting)
 
     def covariance(self, scan: ScanId, of: ScanId | None = None) -> FloatArray:
         """Covariance (3, 3) of x, y (metres) and theta (radians) of a scan's pose in the frame of scan ``of``.
@@ -125,28 +177,11 @@ class Optimised:
 
     def marginals(self, component: int) -> Marginals:
         """Covariances within a component, by its number; made when first asked for."""
-        if component not in self._marginals:
-            part = self.components[component]
-            arrays = EdgeArrays.of(self.counting(component), {scan: i for i, scan in enumerate(part)})
-            poses = np.array([tuple(self.poses[scan]) for scan in part])
-            self._marginals[component] = Marginals(arrays, poses)
-        return self._marginals[component]
-
-    @cached_property
-    def _marginals(self) -> dict[int, Marginals]:
-        return {}
+        return self.parts[component].marginals
 
     @cached_property
     def _numbers(self) -> Mapping[ScanId, int]:
-        return {scan: number for number, part in enumerate(self.components) for scan in part}
-
-    @cached_property
-    def _counting(self) -> tuple[tuple[Edge, ...], ...]:
-        kept: list[list[Edge]] = [[] for _ in self.components]
-        for residual in self.residuals:
-            if not residual.silenced:
-                kept[self._numbers[residual.edge.first]].append(residual.edge)
-        return tuple(map(tuple, kept))
+        return {scan: number for number, part in enumerate(self.parts) for scan in part.scans}
 
     def _number(self, scan: ScanId) -> int:
         number = self.component_of(scan)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -14,9 +13,9 @@ from segmap.graph.arrays import EdgeArrays, gaps, residuals
 from segmap.graph.deciding import decided
 from segmap.graph.edges import Edge, components
 from segmap.graph.least_squares import LeastSquares
-from segmap.graph.optimised import Iteration, Optimised, Residual
+from segmap.graph.optimised import Optimised, Part, Residual
 from segmap.graph.reattaching import reattached
-from segmap.graph.robust import Problem, Round, graduated
+from segmap.graph.robust import Problem, Round, Start, graduated
 from segmap.graph.start import along_logs, composed_along, first_poses, steps_between, tree
 from segmap.graph.with_gtsam import Gtsam
 from segmap.pose import FloatArray, Pose2
@@ -40,6 +39,7 @@ def optimise(
     gate: float = GATE,
     most: float = math.inf,
     backend: str = "auto",
+    known: Optimised | None = None,
     check: Callable[[], None] | None = None,
 ) -> Optimised:
     """The poses of the scans that edges join, each component on its own.
@@ -47,7 +47,9 @@ def optimise(
     ``initial`` poses, in one frame, are where the search begins, and help it only: a better place found from
     where the most reliable edges put the scans is preferred. ``robust`` lets edges that are not trusted be
     silenced where they are farther off than ``gate`` standard deviations, or than ``most`` metres, however
-    little they claim to know; ``check`` is called between steps and raises to stop.
+    little they claim to know. Components of the same edges as in ``known``, an earlier result of the same
+    settings, are taken from there: they would come out the same. ``check`` is called between steps and raises
+    to stop.
 
     Raises:
         GraphError: there is no such backend, or it is not installed.
@@ -55,56 +57,59 @@ def optimise(
     if backend not in BACKENDS:
         raise GraphError(f"There is no backend {backend!r}. Backends are: {', '.join(BACKENDS)}.")
     solve = _BACKENDS[backend]
-    parts = components(edges)
-    number = {scan: i for i, part in enumerate(parts) for scan in part}
-    members: list[list[int]] = [[] for _ in parts]
+    found = components(edges)
+    number = {scan: i for i, scans in enumerate(found) for scan in scans}
+    members: list[list[int]] = [[] for _ in found]
     for i, edge in enumerate(edges):
         members[number[edge.first]].append(i)
-    solutions = [
-        _solved(part, [edges[i] for i in those], initial or {}, gate if robust else None, most, solve, check)
-        for part, those in zip(parts, members, strict=True)
-    ]
+    settings = gate if robust else math.inf, most if robust else math.inf, "scipy" if backend == "auto" else backend
+    held = _reusable(known, settings)
+    solved: list[Part] = []
+    for scans, those in zip(found, members, strict=True):
+        own, part = tuple(edges[i] for i in those), held.get(scans[0])
+        if part is None or part.edges != own:
+            part = _solved(scans, own, initial or {}, gate if robust else None, most, solve, check)
+        solved.append(part)
     fares: dict[int, Residual] = {}
-    for those, solution in zip(members, solutions, strict=True):
-        fares.update(zip(those, solution.residuals, strict=True))
-    return Optimised(
-        poses={scan: pose for s in solutions for scan, pose in s.poses.items()},
-        components=parts,
-        residuals=tuple(fares[i] for i in range(len(edges))),
-        history=tuple(Iteration(i, r.error, r.silenced, r.poses) for i, s in enumerate(solutions) for r in s.rounds),
-        gate=gate if robust else math.inf,
-        backend="scipy" if backend == "auto" else backend,
-        most=most if robust else math.inf,
-    )
+    for those, part in zip(members, solved, strict=True):
+        fares.update(zip(those, part.residuals, strict=True))
+    return Optimised(tuple(solved), tuple(fares[i] for i in range(len(edges))), settings[0], settings[2], settings[1])
 
 
-@dataclass(frozen=True, eq=False)
-class _Solution:
-    poses: dict[ScanId, Pose2]
-    residuals: list[Residual]
-    rounds: list[Round]
+def _reusable(known: Optimised | None, settings: tuple[float, float, str]) -> Mapping[ScanId, Part]:
+    """Components that come out the same again, by their first scans; where poses were given, that depends on them."""
+    if known is None or (known.gate, known.most, known.backend) != settings:
+        return {}
+    return {part.scans[0]: part for part in known.parts if not part.given}
 
 
 _Solve: TypeAlias = Callable[[Problem, Callable[[], None] | None], tuple[FloatArray, FloatArray]]
 
 
 def _solved(
-    scans: Sequence[ScanId],
-    edges: Sequence[Edge],
+    scans: tuple[ScanId, ...],
+    edges: tuple[Edge, ...],
     initial: Mapping[ScanId, Pose2],
     gate: float | None,
     most: float,
     solve: _Solve,
     check: Callable[[], None] | None,
-) -> _Solution:
+) -> Part:
     """One component."""
     arrays = EdgeArrays.of(edges, {scan: i for i, scan in enumerate(scans)})
     rounds: list[Round] = []
-    starts = [first_poses(scans, edges, initial)] if any(scan in initial for scan in scans) else []
+    starts: list[Start] = [
+        lambda: first_poses(scans, edges),
+        lambda: _voted(scans, edges, arrays, gate or np.inf),
+    ]
+    given = any(scan in initial for scan in scans)
+    if given:
+        starts.insert(0, lambda: first_poses(scans, edges, initial))
     problem = Problem(
         edges=arrays,
-        starts=(*starts, first_poses(scans, edges), _voted(scans, edges, arrays, gate or np.inf)),
-        given=bool(starts),
+        count=len(scans),
+        starts=starts,
+        given=given,
         reliance=np.array([1.0 / (1.0 + steps_between(edge)) for edge in edges]),
         free=np.array([i for i, edge in enumerate(edges) if gate is not None and not edge.trusted], np.int64),
         gate=gate or np.inf,
@@ -113,7 +118,8 @@ def _solved(
     )
     poses, weights = solve(problem, check)
     placed = {scan: Pose2(*row) for scan, row in zip(scans, poses.tolist(), strict=True)}
-    return _Solution(placed, _residuals(arrays, edges, poses, weights), rounds)
+    left = tuple(_residuals(arrays, edges, poses, weights))
+    return Part(scans, edges, placed, left, tuple(rounds), given, bool(len(problem.free)) and len(rounds) == 1)
 
 
 def _voted(scans: Sequence[ScanId], edges: Sequence[Edge], arrays: EdgeArrays, gate: float) -> FloatArray:
@@ -133,7 +139,7 @@ def _residuals(arrays: EdgeArrays, edges: Sequence[Edge], poses: FloatArray, wei
 
 
 def _with_scipy(problem: Problem, check: Callable[[], None] | None) -> tuple[FloatArray, FloatArray]:
-    minimise = LeastSquares(problem.edges, len(problem.starts[0]), check).minimised
+    minimise = LeastSquares(problem.edges, problem.count, check).minimised
     return decided(problem, minimise, lambda poses: graduated(problem, poses, minimise))
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from segmap.graph.edges import Edge
-from segmap.graph.optimised import Optimised, Residual
+from segmap.graph.optimised import HALF, Optimised, Residual
 from segmap.graph.optimising import GATE, optimise
 from segmap.graph.ways import Loop, loop_of
 from segmap.graph.words import described_loop, in_words
@@ -71,21 +72,27 @@ def preview(
 ) -> Preview:
     """What would come of accepting ``candidate`` beside the accepted ``edges``.
 
-    ``before`` is the present graph, the result of :func:`optimise` on ``edges``; without it, it is computed.
+    ``before`` is the present graph, or an earlier one under the same settings: components that hold the same edges
+    are taken from it.
     """
-    before = before or optimise(edges, gate=gate, most=most, check=check)
-    believed = replace(candidate, trusted=True)
+    solve = partial(optimise, gate=gate, most=most, check=check)
+    before = solve(edges, known=before)
     initial = before.poses if _together(candidate, before) else None
-    after = optimise([*edges, believed], initial, gate=gate, most=most, check=check)
-    judged = optimise([*edges, replace(candidate, trusted=False)], initial, gate=gate, most=most, check=check)
-    expected = _expected(candidate, before, judged.residuals[-1].weight)
+
+    def with_it(*, trusted: bool) -> Optimised:
+        return solve([*edges, replace(candidate, trusted=trusted)], initial, known=before)
+
+    after = with_it(trusted=True)
+    certain = initial is None or _agreed(after)
+    weight = 1.0 if certain else with_it(trusted=False).residuals[-1].weight
+    expected = _expected(candidate, before, weight)
     now_silent = zip(before.residuals, after.residuals[:-1], strict=True)
     contradicts = [new for old, new in now_silent if new.silenced and not old.silenced]
     return Preview(
         candidate=candidate,
         joins=expected is None,
         expected=expected,
-        silenced=judged.residuals[-1].silenced,
+        silenced=weight < HALF,
         shifts=tuple(_shifts(before, after)),
         contradicts=tuple(sorted(contradicts, key=lambda residual: -residual.chi)),
         loop=loop_of(candidate, before.ways()),
@@ -96,6 +103,17 @@ def preview(
 def _together(candidate: Edge, before: Optimised) -> bool:
     first, second = before.component_of(candidate.first), before.component_of(candidate.second)
     return first is not None and first == second
+
+
+def _agreed(after: Optimised) -> bool:
+    """Whether the optimiser would not silence the last edge, as nothing in its component contradicts anything.
+
+    Then it finds the same where the edge is not trusted: all edges count from the beginning.
+    """
+    last = after.residuals[-1]
+    part = after.part_of(last.edge.first)
+    all_count = part is not None and part.agreed and all(one.weight == 1.0 for one in part.residuals)
+    return all_count and last.translation <= after.most
 
 
 def _expected(candidate: Edge, before: Optimised, weight: float) -> Residual | None:

@@ -8,7 +8,7 @@ out is then settled, so that weights are 0 or 1 and every part of the graph stil
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -20,7 +20,7 @@ from segmap.graph.marginals import Marginals
 from segmap.graph.reattaching import reattached
 from segmap.pose import FloatArray, IntArray
 
-__all__ = ["Minimise", "Problem", "Round", "graduated", "reconsidered", "settled"]
+__all__ = ["Minimise", "Problem", "Round", "Start", "graduated", "reconsidered", "settled"]
 
 SHARPENING = 2.0
 """how much closer to its true form the loss comes each round; Yang et al. take 1.4, and more rounds, to the same end"""
@@ -41,6 +41,8 @@ MOST_EFFORT = 300_000_000
 
 Minimise: TypeAlias = Callable[[FloatArray, FloatArray, int], FloatArray]
 """Poses, weights of the edges and a number of steps -> poses nearer to the minimum of the weighted squares."""
+Start: TypeAlias = Callable[[], FloatArray]
+"""Gives poses (n, 3) to begin from; called where it comes to that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +62,10 @@ class Problem:
     """One component to be optimised."""
 
     edges: EdgeArrays
-    starts: tuple[FloatArray, ...]
-    """poses (n, 3) to begin from: those that were given, along the surest edges, along the edges nearest in the logs"""
+    count: int
+    """n, of the poses"""
+    starts: Sequence[Start]
+    """where to begin: at poses that were given, along the surest edges, along the edges nearest in the logs"""
     given: bool
     """whether the first were"""
     reliance: FloatArray

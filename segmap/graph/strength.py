@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from segmap.graph.cuts import bridges, smallest_cut
 from segmap.graph.edges import Edge
-from segmap.graph.optimised import Optimised
+from segmap.graph.optimised import Optimised, Part
 from segmap.scans import ScanId
 
-__all__ = ["Strength", "strength"]
+__all__ = ["Strength", "strength", "strength_of"]
 
 
 @dataclass(frozen=True)
@@ -38,16 +38,17 @@ class Strength:
 
 def strength(result: Optimised) -> tuple[Strength, ...]:
     """The strength of every component, in their order."""
-    return tuple(_strength(result, number) for number in range(len(result.components)))
+    return tuple(map(strength_of, result.parts))
 
 
-def _strength(result: Optimised, number: int) -> Strength:
-    scans, edges = result.components[number], result.counting(number)
+def strength_of(part: Part) -> Strength:
+    """The strength of one component."""
+    scans, edges = part.scans, part.counting
     places = {scan: place for place, scan in enumerate(scans)}
     links = [(places[edge.first], places[edge.second]) for edge in edges]
     ends = Counter(place for link in links for place in link)
     lost = smallest_cut(links, len(scans))
-    soft = result.marginals(number).softest()
+    soft = part.marginals.softest()
     return Strength(
         scans=scans,
         edges=len(edges),

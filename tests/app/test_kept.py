@@ -13,11 +13,19 @@ import pytest
 
 from app.errors import UnknownError
 from app.pairs import Pairs, integrations_of
+from app.review import Row, Rows, counts, queue
 from app.routes.files import _Files
 from app.schemas import Integration
 from app.session import Session
 from segmap.errors import ProjectError
 from segmap.events import Proposal
+
+
+def made_anew(session: Session) -> list[Row]:
+    """The queue, with nothing remembered."""
+    state, blank = session.state, Rows(session.integrations)
+    found = (blank.row(id, state, session.outcome(id), session.loops.graph) for id in session.integrations)
+    return queue(found, state.mode, state.parameters)
 
 
 def test_the_text_of_the_queue_is_the_queue(session: Session) -> None:
@@ -47,6 +55,9 @@ def test_the_text_of_the_queue_is_the_queue(session: Session) -> None:
         assert gzip.decompress(text.packed) == text.plain
         assert tags.setdefault(text.tag, text.plain) == text.plain
         assert session.integrations == integrations_of(session.state, session.scan_ids)
+        assert session.rows() == made_anew(session)
+        assert session.counts() == counts(session.rows())
+        assert [session.listed.row(row.id) for row in session.rows()] == session.rows()
     assert len(tags) > 5
     assert session.queue_text() is session.queue_text()
 

@@ -206,6 +206,21 @@ def test_components_are_kept_apart():
         assert both.poses[part[0]] == Pose2.identity()
 
 
+def test_components_that_are_known_come_out_the_same():
+    """What is taken from an earlier result is what would be found anew; what changed, or began elsewhere, is not."""
+    (_, left), (_, right) = ring(30, seed=1), ring(20, seed=2, log=1)
+    right = with_wrong(right, 0.2, "random")
+    before, changed = optimise([*left, *right]), [*right, *left[:-1]]
+    anew, found = optimise(changed), optimise(changed, known=before)
+    assert [part is held for part, held in zip(found.parts, before.parts, strict=True)] == [False, True]
+    assert (found.poses, found.residuals, found.components) == (anew.poses, anew.residuals, anew.components)
+    assert [step.error for step in found.history] == [step.error for step in anew.history]
+    for other in ({"gate": 4.0}, {"most": 0.4}, {"robust": False}):
+        assert not {*optimise(changed, known=before, **other).parts} & {*before.parts}
+    begun = optimise(changed, before.poses)
+    assert not {*optimise(changed, known=begun).parts} & {*begun.parts}
+
+
 def test_components_and_lonely_scans():
     """Scans that no edge holds are components of their own; edges alone say what hangs together."""
     edges = [Edge(ScanId(0, a), ScanId(0, b), Pose2.identity(), COVARIANCE) for a, b in ((5, 1), (1, 7), (2, 3))]

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from graphs import COVARIANCE, far_apart, ring
+from graphs import COVARIANCE, far_apart, ring, with_wrong
 
 from segmap.graph import Edge, Ways, explain, loop_of, optimise, preview
 from segmap.pose import Pose2
@@ -131,6 +131,34 @@ def test_preview_tells_what_accepting_does(edges):
     most = shown.shifts[0]
     assert before.poses[most.scan].distance(after.poses[most.scan])[0] == pytest.approx(most.translation, abs=1e-6)
     assert far_apart(shown.after.poses, after.poses) == pytest.approx((0.0, 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("slide", [0.0, 0.05, 0.1, 0.15, 0.3, 3.0])
+@pytest.mark.parametrize("share", [0.0, 0.1])
+def test_what_a_preview_says_of_the_candidate_is_what_the_optimiser_does(slide, share):
+    """It is silenced exactly if it is once it is accepted, also where all agree and nothing is tried."""
+    truth, edges = ring(30, trusted=False)
+    held = with_wrong([*edges, *ring(12, log=1)[1]], share, "random") if share else edges
+    T_3_21 = truth[ScanId(0, 3)].inverse() @ truth[ScanId(0, 21)]
+    candidate = Edge(ScanId(0, 3), ScanId(0, 21), Pose2(T_3_21.x + slide, T_3_21.y, T_3_21.theta), COVARIANCE)
+    before = optimise(held, most=0.4)
+    shown = preview(held, candidate, before, most=0.4)
+    accepted = optimise([*held, candidate], before.poses, most=0.4).residuals[-1]
+    assert (shown.silenced, shown.expected.weight) == (accepted.silenced, accepted.weight)
+    assert shown.silenced == (slide > 0.12)
+
+
+def test_a_preview_leaves_other_components_as_they_are(edges):
+    """They are the very same; also where the candidate is another pose of what is accepted already."""
+    other = ring(20, log=1)[1]
+    before = optimise([*other, *edges])
+    shown = preview([*other, *edges], WRONG, before)
+    assert shown.after.part_of(ScanId(1, 3)) is before.part_of(ScanId(1, 3))
+    assert {shift.scan.log for shift in shown.shifts} == {0}
+    again = preview([*other[1:], *edges], replace(other[0], T_1_2=Pose2(1.0, 1.0, 1.0)), before)
+    assert again.after.part_of(ScanId(0, 3)) is before.part_of(ScanId(0, 3))
+    assert again.after.part_of(ScanId(1, 3)) is not before.part_of(ScanId(1, 3))
+    assert before.part_of(ScanId(9, 9)) is None
 
 
 def test_preview_of_what_joins_two_components(edges):
