@@ -41,7 +41,7 @@ class Loops:
     ) -> None:
         self._session, self._prepare, self._take, self._workers = session, prepare, take, workers
         self._store = store
-        self._graph = PoseGraph(lambda: session.state, solve, optimised)
+        self._graph = PoseGraph(lambda: session.state, solve, optimised, prepare)
         self._search = LoopSearch(self._find, lambda: searching({"type": "search", **self.progress.to_json()}))
         self.start, self.cancel = self._search.start, self._search.cancel
         self.optimise = self._graph.ask

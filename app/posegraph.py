@@ -212,8 +212,14 @@ def graph_of(state: ProjectState, solve: Solver, check: Check | None = None, bef
 class PoseGraph:
     """Keeps the graph of a project up to date, in a thread of its own."""
 
-    def __init__(self, state: Callable[[], ProjectState], solve: Solver, done: Callable[[], None]) -> None:
-        self._state, self._solve, self._done = state, solve, done
+    def __init__(
+        self,
+        state: Callable[[], ProjectState],
+        solve: Solver,
+        done: Callable[[], None],
+        prepare: Callable[[Check], None],
+    ) -> None:
+        self._state, self._solve, self._done, self._prepare = state, solve, done, prepare
         self.current = Graph(0, (), optimise(()), ())
         self._latest = Latest(self._optimise, "optimising")
         self.ask, self.settle, self.close = self._latest.ask, self._latest.settle, self._latest.close
@@ -224,5 +230,6 @@ class PoseGraph:
         return self._latest.busy
 
     def _optimise(self, check: Check) -> None:
+        self._prepare(check)
         self.current = graph_of(self._state(), self._solve, check, self.current)
         self._done()

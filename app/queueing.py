@@ -59,9 +59,9 @@ class Queueing(ABC):
         """The review queue, the integration that most needs a person first."""
         return list(self.listed.rows)
 
-    def queue_text(self) -> QueueText:
-        """The same as the pages get it."""
-        return self._texts.of(self.listed.rows)
+    def queue_text(self, since: str = "") -> QueueText:
+        """The same as the pages get it; to who has the queue of the tag ``since``, what changed."""
+        return self._texts.of(self.listed.rows, since)
 
     @property
     def listed(self) -> Listed:

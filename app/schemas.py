@@ -316,8 +316,17 @@ class Integration(BaseModel):
 
 
 class Queue(BaseModel):
-    """The review queue, the integration that most needs a person first."""
+    """The review queue, the integration that most needs a person first; or what changed in it."""
 
+    tag: str
+    """of this queue; asked for ``since`` it, the answer is what changed"""
+    since: str | None
+    """null: these are all integrations. Otherwise only those that changed since the queue of this tag: to be taken out
+    of it where they stand, and put in where they stand now, from the first to the last"""
+    places: list[int]
+    """where each of these stands now, from 0; empty where they are all"""
+    gone: list[str]
+    """integrations that are not in the queue any more; the same"""
     integrations: list[Integration]
 
 

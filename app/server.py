@@ -40,6 +40,8 @@ PORT = 8000
 NEXT_PORTS = 20
 TEND_SECONDS = 2.0
 GRACE_SECONDS = 3
+KEEP_ALIVE_SECONDS = 75
+"""that a connection stays open for a browser's next request"""
 SOCKET_BYTES = 64 * 1024 * 1024
 ROUTERS = (
     pages.router,
@@ -181,6 +183,7 @@ def _config(app: FastAPI) -> uvicorn.Config:
         ws_max_size=SOCKET_BYTES,
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=GRACE_SECONDS,
+        timeout_keep_alive=KEEP_ALIVE_SECONDS,
     )
 
 

@@ -345,6 +345,10 @@ class Session(Steps, Queueing):
     def _tell_all(self, event: Mapping[str, Any]) -> None:
         self._tell(event)
 
+    def get_ready(self) -> None:
+        """Wait until the kernels are compiled: a request that compiled them itself would hold up every other."""
+        self._prepare(lambda: None)
+
     def _prepare(self, check: Check) -> None:
         if self._warm_up is not None:
             self._warm_up.wait(check)

@@ -8,25 +8,33 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
 from segmap.evaluation import BOUNDED, search
 from segmap.export.grid import grid_of
+from segmap.graph import Edge, optimise, preview, strength
 from segmap.integration import MODES, heuristics, integrate
 from segmap.parameters import Parameters
-from segmap.scans import LaserScan
+from segmap.pose import Pose2
+from segmap.scans import LaserScan, ScanId
 from segmap.segments import Order, SegmentMap, extract
 
 __all__ = ["first", "rest"]
 
 
 PARAMETERS = Parameters(random_rounds=1)
+COVARIANCE = ((0.01, 0.0, 0.0), (0.0, 0.01, 0.0), (0.0, 0.0, 0.01))
 
 
 def first() -> None:
-    """Integrate two small maps as a project does that was just opened."""
+    """Integrate two small maps, and optimise a small graph, as a project does that was just opened."""
     integrate(_room(), _room(), PARAMETERS, mode="verified")
+    scans = [ScanId(0, i) for i in range(3)]
+    edges = [Edge(a, b, Pose2.identity(), COVARIANCE) for a, b in combinations(scans, 2)]
+    strength(optimise(edges))
+    preview(edges[:2], replace(edges[2], T_1_2=Pose2(9.0, 0.0, 0.0)), most=1.0)
 
 
 def rest() -> None:

@@ -88,7 +88,7 @@ class Browser:
         self.numbers = random.Random(seed)
         self.client = httpx.AsyncClient(base_url=url, timeout=120.0, limits=CONNECTIONS, trust_env=False)
         self.api = f"/api/projects/{project}"
-        self.view, self.scene, self.rows = "", "", list[dict[str, Any]]()
+        self.view, self.scene, self.tag, self.rows = "", "", "", list[dict[str, Any]]()
         self.etags: dict[str, str] = {}
         self.stale = asyncio.Event()
 
@@ -139,11 +139,14 @@ class Browser:
 
     async def load(self) -> None:
         """What the page loads again when something changed."""
+        since = f"?since={self.tag}" if self.tag else ""
         info, rows = await asyncio.gather(
             self.request(self.named("project"), "GET", self.api),
-            self.request(self.named("queue"), "GET", f"{self.api}/integrations"),
+            self.request(self.named("queue"), "GET", f"{self.api}/integrations{since}"),
         )
-        if not self.rows and info.content:  # a client that read every answer would measure itself
+        tag = re.match(rb'\{"tag":"([^"]+)"', rows.content)  # a client that read every answer would measure itself
+        self.tag = tag[1].decode() if tag else self.tag
+        if not self.rows and info.content:
             self.rows = rows.json()["integrations"][:200]
 
     def named(self, what: str) -> str:

@@ -71,6 +71,7 @@ def preview(
     candidate: Annotated[int, Query(ge=0, le=2**31)] = 0,
 ) -> PreviewBody:
     """What accepting a candidate would do to the pose graph."""
+    session.get_ready()
     return _body(integration, session.loops.preview(integration, heuristic, candidate))
 
 

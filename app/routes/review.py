@@ -36,11 +36,12 @@ router = APIRouter(prefix="/api/projects/{project}", tags=["review"])
 
 
 @router.get("/integrations", response_model=Queue)
-def integrations(session: Opened, request: Request) -> Response:
-    """All integrations, the one that most needs a person first."""
-    text = session.queue_text()
-    headers = {"ETag": text.tag, "Vary": "Accept-Encoding"}
-    if text.tag in request.headers.get("if-none-match", ""):
+def integrations(session: Opened, request: Request, since: Annotated[str, Query(max_length=80)] = "") -> Response:
+    """All integrations, the one that most needs a person first; with the tag of an earlier answer, what changed."""
+    text = session.queue_text(since)
+    etag = f'"{text.tag}"'
+    headers = {"Cache-Control": "no-store"} if since else {"ETag": etag, "Vary": "Accept-Encoding"}
+    if not since and etag in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)
     if "gzip" in request.headers.get("accept-encoding", ""):
         return Response(text.packed, media_type="application/json", headers=headers | {"Content-Encoding": "gzip"})

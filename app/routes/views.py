@@ -21,6 +21,7 @@ router = APIRouter(prefix="/api", tags=["views"])
 @router.post("/projects/{project}/views", status_code=201)
 def open_view(site: Site, session: Opened) -> ViewOpened:
     """A new view of a project, with a scene of its own."""
+    session.get_ready()
     opened = site.views.open(session)
     return ViewOpened(id=opened.id, scene=f"/views/{opened.id}/scene/")
 

@@ -12,6 +12,9 @@ const VALUE = { parameter: "value_threshold", quantity: "value", unit: "m", maxi
 /** Tells "info", "rows", "progress", "match", "graph", "search", "searched", "map", "parameters", "decided", "deleted" and "trouble" as events. */
 export class Project extends EventTarget {
   #said = false;
+  #tag = "";
+  /** Rows as they were loaded, of those that events have written into since. */
+  #original = new Map();
 
   constructor(id) {
     super();
@@ -144,10 +147,30 @@ export class Project extends EventTarget {
   }
 
   async #loadRows() {
-    const { integrations } = await get(`${this.url}/integrations`);
-    this.rows = integrations;
-    this.index = new Map(integrations.map((row) => [row.id, row]));
+    const answer = await get(`${this.url}/integrations${this.#tag ? `?since=${this.#tag}` : ""}`);
+    this.rows = answer.since === null ? answer.integrations : this.#patched(answer);
+    this.index = new Map(this.rows.map((row) => [row.id, row]));
+    this.#tag = answer.tag;
+    this.#original.clear();
     this.tell("rows");
+  }
+
+  /** The rows with what changed since they were loaded; what events wrote into the others meanwhile is taken back. */
+  #patched({ integrations, places, gone }) {
+    for (const [id, row] of this.#original) Object.assign(this.index.get(id), row);
+    const out = new Set([...gone, ...integrations.map((row) => row.id)]);
+    const rows = [];
+    let next = 0;
+    const put = () => {
+      while (places[next] === rows.length) rows.push(integrations[next++]);
+    };
+    for (const row of this.rows) {
+      if (out.has(row.id)) continue;
+      put();
+      rows.push(row);
+    }
+    put();
+    return rows;
   }
 
   /** A match was found: show it in its place at once, and the new order when there is time. */
@@ -169,7 +192,11 @@ export class Project extends EventTarget {
 
   /** Newer rows, each in the place it has. */
   #put(rows) {
-    for (const row of rows) Object.assign(this.index.get(row.id) ?? {}, row);
+    for (const row of rows) {
+      const held = this.index.get(row.id);
+      if (held && !this.#original.has(row.id)) this.#original.set(row.id, { ...held });
+      Object.assign(held ?? {}, row);
+    }
   }
 
   /** How far the search is; its last word is told once. */

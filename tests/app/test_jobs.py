@@ -12,6 +12,7 @@ from app.jobs import Backlog, Check, Latest, WarmUp
 from app.warm_up import first, rest
 from segmap import _bound_kernels, _search_kernels, _value_kernels
 from segmap.errors import CancelledError
+from segmap.graph import _inverse
 
 PATIENCE = 60.0
 
@@ -260,6 +261,13 @@ def test_what_only_large_searches_need_is_compiled_too() -> None:
     first()
     rest()
     kernels = (_bound_kernels.paint, _search_kernels.look_up, _search_kernels.outlast, _value_kernels.crossing)
+    assert all(kernel.signatures for kernel in kernels)
+
+
+def test_what_the_graph_takes_is_compiled_before_anything_else() -> None:
+    """It is optimised as soon as a project is open: a request must never wait for its compiler."""
+    first()
+    kernels = (_inverse.column_starts, _inverse.factorise, _inverse.invert, _inverse.looked_up)
     assert all(kernel.signatures for kernel in kernels)
 
 

@@ -13,12 +13,25 @@ import pytest
 
 from app.errors import UnknownError
 from app.pairs import Pairs, integrations_of
+from app.queue_text import EARLIER, QueueTexts
 from app.review import Row, Rows, counts, queue
 from app.routes.files import _Files
 from app.schemas import Integration
 from app.session import Session
 from segmap.errors import ProjectError
 from segmap.events import Proposal
+from segmap.scans import ScanId
+
+
+def patched(rows: list[Any], answer: dict[str, Any]) -> list[Any]:
+    """What a page has after an answer, as ``app.schemas.Queue`` says."""
+    if answer["since"] is None:
+        return list(answer["integrations"])
+    out = {*answer["gone"], *(row["id"] for row in answer["integrations"])}
+    rows = [row for row in rows if row["id"] not in out]
+    for place, row in zip(answer["places"], answer["integrations"], strict=True):
+        rows.insert(place, row)
+    return rows
 
 
 def made_anew(session: Session) -> list[Row]:
@@ -31,6 +44,7 @@ def made_anew(session: Session) -> list[Row]:
 def test_the_text_of_the_queue_is_the_queue(session: Session) -> None:
     """After any steps: the rows in their order, of which each is as its schema says; another tag for another text."""
     chance, tags = random.Random(3), dict[str, bytes]()
+    held, told, sizes = list[Any](), "", set[int]()
     for _ in range(25):
         id = chance.choice(session.integrations)
         step = chance.choice(("accepted", "rejected", "clear", "undo", "redo", "propose", "threshold"))
@@ -51,7 +65,12 @@ def test_the_text_of_the_queue_is_the_queue(session: Session) -> None:
             continue
         assert session.settle(60.0)
         text = session.queue_text()
-        assert json.loads(text.plain)["integrations"] == [Integration.of(row).model_dump() for row in session.rows()]
+        whole = json.loads(text.plain)["integrations"]
+        assert whole == [Integration.of(row).model_dump() for row in session.rows()]
+        answer = json.loads(session.queue_text(told).plain)
+        held, told = patched(held, answer), answer["tag"]
+        assert (held, told) == (whole, text.tag)
+        sizes.add(len(answer["integrations"]))
         assert gzip.decompress(text.packed) == text.plain
         assert tags.setdefault(text.tag, text.plain) == text.plain
         assert session.integrations == integrations_of(session.state, session.scan_ids)
@@ -59,7 +78,52 @@ def test_the_text_of_the_queue_is_the_queue(session: Session) -> None:
         assert session.counts() == counts(session.rows())
         assert [session.listed.row(row.id) for row in session.rows()] == session.rows()
     assert len(tags) > 5
+    assert {0, 1} < sizes
     assert session.queue_text() is session.queue_text()
+
+
+def rows_of(names: str) -> tuple[Row, ...]:
+    return tuple(ROWS[name] for name in names)
+
+
+ROWS = {name: Row(f"0.{i}-0.{i + 1}", ScanId(0, i), ScanId(0, i + 1), "pending") for i, name in enumerate("abcdefgh")}
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "since", "sent"),
+    [
+        ("abcdefgh", "abcdefgh", True, ""),
+        ("abcdefgh", "abcdegh", True, ""),
+        ("abcdefg", "abhcdefg", True, "h"),
+        ("abcdef", "ghabcdef", True, "gh"),
+        ("abcdef", "bacdef", False, "bacdef"),
+        ("abc", "abcdefgh", False, "abcdefgh"),
+        ("", "abc", False, "abc"),
+        ("abc", "", True, ""),
+    ],
+)
+def test_only_what_changed_is_sent(before: str, after: str, since: bool, sent: str) -> None:
+    """Rows that are new or others, and where they stand; all where most are, or the rest is in another order."""
+    texts = QueueTexts()
+    tag = texts.of(rows_of(before)).tag
+    answer = json.loads(texts.of(rows_of(after), tag).plain)
+    assert (answer["since"] == tag) is since
+    assert [row["id"] for row in answer["integrations"]] == [ROWS[name].id for name in sent]
+    held = patched([row.to_json() for row in rows_of(before)], answer)
+    assert held == [row.to_json() for row in rows_of(after)]
+
+
+def test_who_was_away_for_long_gets_everything() -> None:
+    """Earlier queues are remembered for some time, and not for ever; of another server's nothing is known."""
+    texts = QueueTexts()
+    tag = texts.of(rows_of("abcdefg")).tag
+    for turn in range(EARLIER - 1):
+        rows = rows_of("abcdefgh" if turn % 2 else "abcdef")
+        assert json.loads(texts.of(rows, tag).plain)["since"] == tag
+    now = texts.of(rows_of("abcdefg")).tag
+    for old in (tag, "", "x-1", QueueTexts().of(rows_of("abcdefg")).tag):
+        assert json.loads(texts.of(rows, old).plain)["since"] is None
+    assert json.loads(texts.of(rows, now).plain)["since"] == now
 
 
 def test_pairs_are_made_again_where_there_are_others(session: Session) -> None:
@@ -89,6 +153,10 @@ def test_a_queue_that_is_the_same_is_not_sent_again(client: Any, project: str) -
     assert client.post(f"/api/projects/{project}/decisions", json=body).status_code == 200
     again = client.get(url, headers={"if-none-match": tag})
     assert (again.status_code, again.headers["etag"] != tag) == (200, True)
+    changes = client.get(url, params={"since": plain.json()["tag"]})
+    assert (changes.headers["cache-control"], "etag" in changes.headers) == ("no-store", False)
+    assert patched(plain.json()["integrations"], changes.json()) == again.json()["integrations"]
+    assert len(changes.json()["integrations"]) < len(again.json()["integrations"])
 
 
 def test_files_of_the_pages(tmp_path: Path) -> None:
