@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import subprocess
+
 import numpy as np
 import pytest
 
@@ -32,6 +36,23 @@ def test_numbered_without_times(times):
     content = trajectory(POSES, times)
     assert read_back(content)[:, 0].tolist() == [0.0, 1.0, 2.0]
     assert b"# number x y z" in content
+
+
+@pytest.mark.slow
+def test_evo_reads_the_same_poses(tmp_path):
+    """evo, by which people score trajectories, finds every pose where it was written. Run as a program, never imported."""
+    evo = shutil.which("evo_traj")
+    if evo is None:
+        pytest.skip("evo is not there: pipx install evo")
+    (tmp_path / "map.tum").write_bytes(trajectory(POSES, [10.0, 10.5, 12.0], ["component 1", "map_hash: 5f3a"]))
+    home = {"HOME": str(tmp_path), "PATH": os.environ["PATH"], "MPLBACKEND": "Agg"}
+    command = [evo, "tum", "map.tum", "--save_as_kitti", "--no_warnings"]
+    subprocess.run(command, cwd=tmp_path, env=home, check=True, capture_output=True, timeout=300)
+    (turned_x, _, _, x), (turned_y, _, _, y), _ = (
+        np.loadtxt(tmp_path / "map.kitti").reshape(-1, 3, 4).transpose(1, 2, 0)
+    )
+    found = np.column_stack((x, y, np.arctan2(turned_y, turned_x)))
+    assert found == pytest.approx(np.array([list(pose) for pose in POSES]), abs=1e-6)
 
 
 def test_empty():
