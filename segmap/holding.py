@@ -8,7 +8,7 @@ from segmap.graph import components
 from segmap.links import Link
 from segmap.scans import ScanId
 
-__all__ = ["FIRM", "doubtful_steps", "weakly_held"]
+__all__ = ["FIRM", "doubtful_steps", "loose_parts", "weakly_held"]
 
 FIRM = ("accepted", "agreed", "closed", "tracked")
 """links that bear a place out"""
@@ -35,6 +35,17 @@ def weakly_held(links: Sequence[Link], wholes: Sequence[Sequence[ScanId]]) -> di
     or what fits the robot's pace, may be where they are or not. Where two ways lead to them, one bears out the
     other: the links given are those that the optimiser does not silence.
     """
+    return {
+        scan: f"{len(part)} scans from {part[0]} on hang on the rest by a step that no accepted integration bears out."
+        for part, loose in loose_parts(links, wholes)
+        for scan in loose
+    }
+
+
+def loose_parts(
+    links: Sequence[Link], wholes: Sequence[Sequence[ScanId]]
+) -> list[tuple[tuple[ScanId, ...], tuple[ScanId, ...]]]:
+    """The parts that hang on the rest by one doubtful step: all scans of each, and those no other way leads to."""
     scans = [scan for whole in wholes for scan in whole]
     homes = _homes(components([link.edge for link in links if link.why in FIRM], scans), wholes)
     held: set[ScanId] = set(scans)
@@ -43,12 +54,7 @@ def weakly_held(links: Sequence[Link], wholes: Sequence[Sequence[ScanId]]) -> di
         parts = components([link.edge for link in links if link.pair not in left_out], scans)
         held &= {scan for part in parts if not homes.isdisjoint(part) for scan in part}
     loose = components([link.edge for link in links if link.why in FIRM], set(scans) - held)
-    return {
-        scan: f"{len(part)} scans from {part[0]} on hang on the rest by a step that no accepted integration bears out."
-        for part in loose
-        for scan in part
-        if scan not in held
-    }
+    return [(part, own) for part in loose if (own := tuple(scan for scan in part if scan not in held))]
 
 
 def _homes(parts: Sequence[Sequence[ScanId]], wholes: Sequence[Sequence[ScanId]]) -> set[ScanId]:

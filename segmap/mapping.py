@@ -11,7 +11,7 @@ import numpy as np
 from segmap.fusion import fuse_all
 from segmap.graph import Optimised, optimise
 from segmap.graph.edges import Parts
-from segmap.holding import weakly_held
+from segmap.holding import FIRM, loose_parts, weakly_held
 from segmap.integration import Match
 from segmap.keyframes import chained
 from segmap.links import Link, Pace
@@ -33,7 +33,7 @@ from segmap.pose import Pose2
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 from segmap.spreading import Crew, Keep, Matches, Pair, Told
-from segmap.strays import placed, strays
+from segmap.strays import beside, placed, strays
 
 __all__ = ["WholeMap", "fused", "map_scans"]
 
@@ -151,6 +151,7 @@ def _close_loops(task: _Task, keys: Sequence[ScanId], links: dict[Pair, Link], m
             break
         links.update((link.pair, link) for link in holding)
         optimised = optimise([link.edge for link in links.values()], check=task.crew.check)
+    _reconsider(task, optimised, links, matches)
 
 
 def _placed(task: _Task, scene: Scene, optimised: Optimised, matches: Matches) -> list[Link]:
@@ -159,6 +160,20 @@ def _placed(task: _Task, scene: Scene, optimised: Optimised, matches: Matches) -
     for stray in strays(scene.scans, optimised.components):
         links.extend(placed(stray, task.crew, optimised.poses, task.paces, matches))
     return links
+
+
+def _reconsider(task: _Task, optimised: Optimised, links: dict[Pair, Link], matches: Matches) -> None:
+    """Let all scans around vote again on what one doubtful step holds: what they agree on takes its place."""
+    whole = {scan: part for part in optimised.components for scan in part}
+    for part, _ in loose_parts(_sound(optimised, links), optimised.components):
+        stray = beside(part, [scan for scan in whole[part[0]] if scan not in set(part)])
+        found = placed(stray, task.crew, optimised.poses, task.paces, matches) if stray else []
+        if found:
+            own = set(part)
+            for link in [link for link in links.values() if (link.first in own) != (link.second in own)]:
+                if link.why not in FIRM:
+                    del links[link.pair]
+            links.update((link.pair, link) for link in found)
 
 
 def _sound(optimised: Optimised, links: Mapping[Pair, Link]) -> list[Link]:

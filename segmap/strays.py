@@ -7,7 +7,7 @@ at whatever time, has a vote.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -30,7 +30,7 @@ from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 from segmap.spreading import Crew, Matches, Pair
 
-__all__ = ["Stray", "placed", "strays"]
+__all__ = ["Stray", "beside", "placed", "strays"]
 
 REACH = 6.0
 """metres, and radians times metres, from the neighbours of a stray to the scans that vote on it"""
@@ -64,25 +64,29 @@ def strays(keys: Sequence[ScanId], parts: Sequence[Sequence[ScanId]]) -> list[St
     held = set(chain.from_iterable(parts))
     whole = [tuple(part) for part in parts] + [(key,) for key in keys if key not in held]
     owner = {scan: part for part in whole for scan in part}
-    found = [_stray(part, sorted(owner), owner) for part in whole]
-    return sorted((stray for stray in found if stray), key=lambda stray: (-len(stray.scans), stray.scans))
+    found = [stray for part in whole if (stray := _stray(part, owner))]
+    return sorted(found, key=lambda stray: (-len(stray.scans), stray.scans))
 
 
-def _stray(
-    part: tuple[ScanId, ...], keys: Sequence[ScanId], owner: Mapping[ScanId, tuple[ScanId, ...]]
-) -> Stray | None:
+def _stray(part: tuple[ScanId, ...], owner: Mapping[ScanId, tuple[ScanId, ...]]) -> Stray | None:
+    larger = [scan for scan in owner if len(owner[scan]) > len(part)]
+    ends = [end for end in _ends(part, larger) if end is not None]
+    return beside(part, max((owner[end] for end in ends), key=len)) if ends else None
+
+
+def beside(part: Sequence[ScanId], home: Sequence[ScanId]) -> Stray | None:
+    """Some scans of one log as a stray beside a component; None where it holds none before or after them."""
+    before, after = _ends(part, home)
+    return None if before is None and after is None else Stray(tuple(part), tuple(home), before, after)
+
+
+def _ends(part: Sequence[ScanId], others: Iterable[ScanId]) -> tuple[ScanId | None, ScanId | None]:
+    """The last one before and the first one after some scans of one log; none of scans of several."""
     first, last = part[0], part[-1]
-    log = [key for key in keys if key.log == first.log and len(owner[key]) > len(part)]
-    if first.log != last.log or not log:
-        return None
-    before = max((key for key in log if key < first), default=None)
-    after = min((key for key in log if key > last), default=None)
-    homes = [owner[key] for key in (before, after) if key is not None]
-    if not homes:
-        return None
-    home = max(homes, key=len)
-    own = (None if end is None or owner[end] is not home else end for end in (before, after))
-    return Stray(part, home, *own)
+    log = [scan for scan in others if scan.log == first.log == last.log]
+    return max((scan for scan in log if scan < first), default=None), min(
+        (scan for scan in log if scan > last), default=None
+    )
 
 
 def placed(
@@ -94,16 +98,18 @@ def placed(
     scan between two placed neighbours is else judged by what all around it see together, who see through the same
     passer-by only once.
     """
-    own = {scan: poses.get(scan, Pose2.identity()) for scan in sorted({*stray.scans[:SIDE], *stray.scans[-SIDE:]})}
+    own = _own(stray, poses)
     around = {scan: poses[scan] for scan in _around(stray, poses)}
+    ends = [(poses[end], end, own[scan], scan) for end, scan in stray.ends]
+
+    def allowed(T_home_stray: Pose2) -> bool:
+        steps = ((a, T_a.inverse() @ T_home_stray @ T_b, steps_between((a, b))) for T_a, a, T_b, b in ends)
+        return all(paces[end.log].allows(T_1_2, count) for end, T_1_2, count in steps)
+
     seen = sightings(crew.maps, (*around, *own))
     own, around = ({scan: pose for scan, pose in some.items() if scan in seen} for some in (own, around))
     pairs = [_pair(a, b) for a in around for b in own]
     matches.update(crew.matches([pair for pair in pairs if pair not in matches], "placing what is left over"))
-
-    def allowed(T_home_stray: Pose2) -> bool:
-        return _in_pace(stray, poses, T_home_stray, paces)
-
     found = voted(around, own, matches, seen, crew.parameters, allowed)
     T_home_stray = found.T_1_2 if found is not None and found.clear else None
     if T_home_stray is None and len(stray.scans) == 1 and len(stray.ends) == 2 and around:
@@ -116,19 +122,17 @@ def _pair(a: ScanId, b: ScanId) -> Pair:
     return (a, b) if a < b else (b, a)
 
 
+def _own(stray: Stray, poses: Mapping[ScanId, Pose2]) -> dict[ScanId, Pose2]:
+    """Where some scans of a stray are in the frame of its first, those near its ends."""
+    back = poses.get(stray.scans[0], Pose2.identity()).inverse()
+    some = sorted({*stray.scans[:SIDE], *stray.scans[-SIDE:]})
+    return {scan: back @ poses.get(scan, Pose2.identity()) for scan in some}
+
+
 def _around(stray: Stray, poses: Mapping[ScanId, Pose2]) -> list[ScanId]:
     """The scans at home nearest to where the stray's neighbours stood, and looked."""
     near = sorted((min(sum(poses[end].distance(poses[scan])) for end, _ in stray.ends), scan) for scan in stray.home)
     return [scan for far, scan in near[:VOTERS] if far <= REACH]
-
-
-def _in_pace(stray: Stray, poses: Mapping[ScanId, Pose2], T_home_stray: Pose2, paces: Mapping[int, Pace]) -> bool:
-    """Whether the robot could have gone from the neighbours at home to the stray, and back."""
-    for end, own in stray.ends:
-        T_end_own = poses[end].inverse() @ T_home_stray @ poses.get(own, Pose2.identity())
-        if not paces[own.log].allows(T_end_own, steps_between((end, own))):
-            return False
-    return True
 
 
 def _seen_together(

@@ -1,14 +1,19 @@
 """Scans that nothing holds: where they stand in their log, and where they are placed."""
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from found import scans
+from found import candidate, match, scans
 from simulated import noisy, other_room, room
 
 from segmap.consensus import sightings, voted
-from segmap.links import Pace
+from segmap.graph import optimise
+from segmap.holding import weakly_held
+from segmap.links import Link, Pace
+from segmap.mapping import _reconsider, _Task
 from segmap.parameters import preset
 from segmap.pose import Pose2
 from segmap.scans import LaserScan, ScanId
@@ -122,3 +127,24 @@ def test_a_passer_by_does_not_cost_a_scan_its_place(walk, monkeypatch):
         assert turn < math.radians(4.0)
     last = stray_of(WALK[6])
     assert placed(last, Crew(maps, PARAMETERS), left_alone(last, poses), PACE, {}) == []
+
+
+def test_what_one_doubtful_step_holds_is_voted_on_again(walk):
+    """Two scans that a doubtful step put 2 m off are where all scans around them say, and no longer in doubt."""
+    maps, poses = walk
+    own = WALK[5:]
+    off = {scan: Pose2(2.0, 0.0, 0.0) @ poses[scan] if scan in own else poses[scan] for scan in WALK}
+    firm = [*pairwise(WALK[:5]), *pairwise(own)]
+    links = {(a, b): link_at(off[a].inverse() @ off[b], a, b, "accepted") for a, b in firm}
+    wrong = WALK[4], WALK[5]
+    links[wrong] = link_at(off[wrong[0]].inverse() @ off[wrong[1]], *wrong, "voted")
+    task = _Task(Crew(maps, PARAMETERS), PACE)
+    _reconsider(task, optimise([link.edge for link in links.values()]), links, {})
+    after = optimise([link.edge for link in links.values()])
+    assert max(after.poses[scan].distance(poses[scan])[0] for scan in WALK) < 0.15
+    assert weakly_held([*links.values()], after.components) == {}
+
+
+def link_at(T_1_2, first, second, why):
+    """A link made by hand."""
+    return replace(Link.of((first, second), match(candidate(T_1_2)), 0, "accepted"), why=why)
