@@ -40,7 +40,7 @@ def test_numbered_without_times(times):
 
 @pytest.mark.slow
 def test_evo_reads_the_same_poses(tmp_path):
-    """evo, by which people score trajectories, finds every pose where it was written. Run as a program, never imported."""
+    """evo, by which people score trajectories, finds every pose where it was written; run as a program only."""
     evo = shutil.which("evo_traj")
     if evo is None:
         pytest.skip("evo is not there: pipx install evo")
