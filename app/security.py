@@ -73,7 +73,7 @@ class Guard:
         if not allowed_host(headers.get("host"), self._bound):
             return _refused(403, "ForbiddenHost", "This address is not one the server answers to.")
         changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS
-        if changes and not own_origin(headers):
+        if (changes or "origin" in headers) and not own_origin(headers):
             return _refused(403, "ForbiddenOrigin", "Requests from pages of another origin are refused.")
         if not changes and not (_own_site(headers) or _opens_a_page(headers)):
             return _refused(403, "ForbiddenOrigin", "Pages of another origin may embed nothing from here.")

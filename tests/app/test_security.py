@@ -44,6 +44,14 @@ def test_foreign_pages_change_nothing(client: Any, project: str, headers: dict[s
     assert len(client.app.state.services.views) == 0
 
 
+@pytest.mark.parametrize("headers", FOREIGN)
+def test_foreign_pages_read_nothing(client: Any, project: str, headers: dict[str, str]) -> None:
+    """They hear nothing of what is here either, whatever they ask for."""
+    for url in ("/", "/api/projects", f"/api/projects/{project}", f"/api/projects/{project}/events"):
+        answer = client.get(url, headers=headers)
+        assert (answer.status_code, answer.json()["error"]["kind"]) == (403, "ForbiddenOrigin")
+
+
 @pytest.mark.parametrize("site", ["cross-site", "same-site"])
 def test_foreign_pages_embed_nothing(client: Any, project: str, site: str) -> None:
     """A picture, frame, script or stream of ours in a foreign page gets nothing; a link to us may be followed."""
