@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -25,6 +26,10 @@ __all__ = ["Content", "Pair", "Placed", "Tie", "alongside", "merit", "place"]
 
 GAP = 1.0
 """metres between things that have no relation to each other"""
+WIDTH = 1.5
+"""of the rows of components: how often the side of a square as large as all of them"""
+SLOT, LABEL = 0.15, 0.03
+"""what the name of a component takes at least, as shares of the width of the rows"""
 PLACES = 256
 """components at places that are remembered"""
 
@@ -133,20 +138,32 @@ def _at(component: Component, T_map_component: Pose2) -> Placed:
 
 
 def place(components: Iterable[Component], scans: Iterable[ScanId] = ()) -> tuple[Placed, ...]:
-    """Where components are drawn: the one with the first of ``scans`` at the origin, the others in a row beside it.
+    """Where components are drawn: the one with the first of ``scans`` at the origin, the others in rows beside it.
 
-    Components of one scan are left out: they are scans that nothing was integrated with.
+    The rows together are about as wide as a window is, so that many components can still be told apart. Components
+    of one scan are left out: they are scans that nothing was integrated with.
     """
     wanted = next(iter(scans), None)
     grown = sorted((c for c in components if len(c.scans) > 1), key=lambda c: wanted not in c.scans)
-    placed: list[Placed] = []
-    right = 0.0
-    for component in grown:
-        left, bottom, to, _ = _at(component, Pose2.identity()).box or (0.0, 0.0, 0.0, 0.0)
-        shift = Pose2(right - left + GAP, -bottom, 0.0) if placed else Pose2.identity()
-        right = shift.x + to
-        placed.append(_at(component, shift))
-    return tuple(placed)
+    boxes = [_at(component, Pose2.identity()).box or (0.0, 0.0, 0.0, 0.0) for component in grown]
+    return tuple(_at(component, shift) for component, shift in zip(grown, _rows(boxes), strict=True))
+
+
+def _rows(boxes: Sequence[Box]) -> list[Pose2]:
+    """How far boxes move so that they stand in rows, none in another; the first one stays."""
+    if not boxes:
+        return []
+    sides = [(right - left + GAP, top - bottom + GAP) for left, bottom, right, top in boxes]
+    widest = max(max(width for width, _ in sides), WIDTH * math.sqrt(sum(width * height for width, height in sides)))
+    begin, y = boxes[0][0], boxes[0][3]
+    x, lowest, shifts = begin, y, list[Pose2]()
+    for (left, _, _, top), (width, height) in zip(boxes, sides, strict=True):
+        if x > begin and x + width > begin + widest:
+            x, y = begin, lowest - LABEL * widest
+        shifts.append(Pose2(x - left, y - top, 0.0))
+        x += max(width, SLOT * widest)
+        lowest = min(lowest, y - height)
+    return shifts
 
 
 def alongside(placed: Sequence[Placed], others: Iterable[Component], *, over: bool) -> tuple[Placed, ...]:

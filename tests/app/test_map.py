@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.content import Content, alongside
+from app.content import Content, alongside, place
 from app.drawing import draw
 from app.errors import RequestError, UnknownError
 from app.map_layers import WORST
@@ -271,6 +271,26 @@ def test_alongside() -> None:
     (foreign,) = alongside(ours, [part_of(7, 8)], over=True)
     assert foreign.map.bounds[0] > ours[0].map.bounds[2]  # type: ignore[index]
     assert alongside(ours, [part_of(0)], over=True) == ()
+
+
+def sized(place: int, width: float, height: float) -> Component:
+    poses = {ScanId(0, 2 * place + k): Pose2.identity() for k in range(2)}
+    return Component(
+        f"component {place}", tuple(poses), poses, SegmentMap(np.array([[-1.0, 2.0, width - 1.0, height + 2.0]]))
+    )
+
+
+def test_many_components_stand_in_rows() -> None:
+    """Parts of all sizes: none on another, the first where its frame has it, all of them about as wide as a window."""
+    rng = np.random.default_rng(7)
+    parts = [sized(k, *rng.uniform(2.0, 60.0, 2)) for k in range(20)]
+    placed = place(parts)
+    assert placed[0].T_map_component == Pose2.identity()
+    for k, one in enumerate(placed[1:], 1):
+        assert apart(one, *placed[:k])
+    bounds = np.array([one.map.bounds for one in placed])
+    width, height = (bounds[:, 2:].max(axis=0) - bounds[:, :2].min(axis=0)).tolist()
+    assert 0.8 < width / height < 2.5
 
 
 # --- movement -------------------------------------------------------------------------------------
