@@ -34,7 +34,7 @@ FILES = frozenset(
     f"/static/{name}"
     for name in (
         *("favicon.svg", "icons.svg", "css/base.css", "css/project.css"),
-        *(f"js/{name}.js" for name in ("follow", "api", "dom", "format", "stream")),
+        *(f"js/{name}.js" for name in ("theme", "follow", "api", "dom", "format", "stream")),
     )
 )
 """what the page of who follows is made of"""

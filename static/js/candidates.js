@@ -18,6 +18,7 @@ export class Candidates {
   #candidates = [];
   #column = 0;
   #reverse = false;
+  #integration = null;
 
   constructor() {
     this.body = byId("candidates-body");
@@ -39,14 +40,16 @@ export class Candidates {
     this.table.hidden = this.#candidates.length === 0;
     this.table.classList.toggle("unscored", match?.mode === "paper");
     this.#draw();
+    if (view.integration !== this.#integration) byId("panel-candidates").scrollTop = 0;
+    this.#integration = view.integration;
   }
 
-  /** Mark the candidate the scene shows. */
+  /** Mark the candidate the scene shows; where it became another one, its row comes into sight. */
   mark({ snapshot }) {
     const rank = snapshot.held ? null : String(snapshot.candidate ?? 0);
     for (const row of this.body.rows) {
       const chosen = row.dataset.rank === rank;
-      if (chosen && row.getAttribute("aria-selected") !== "true") reveal(row, byId("panel-candidates"));
+      if (chosen && row.getAttribute("aria-selected") === "false") reveal(row, byId("panel-candidates"));
       set(row, "aria-selected", String(chosen));
       row.tabIndex = chosen ? 0 : -1;
     }

@@ -1,11 +1,13 @@
 // The bar at the top: what the project is, how far the matching is, undo and redo in words.
 
+import { appearance } from "./appearance.js";
 import { byId, text } from "./dom.js";
 import { count, whole } from "./format.js";
 import { failed } from "./notices.js";
 
 /** Keep the bar up to date and its buttons working. */
 export function head(project, view) {
+  appearance(byId("appearance"));
   for (const way of ["undo", "redo"]) byId(way).addEventListener("click", () => view.act(way).catch(failed));
   byId("matching-action").addEventListener("click", () => project.matching(byId("matching-action").value).catch(failed));
   project.addEventListener("info", () => information(project.info));

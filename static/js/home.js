@@ -1,12 +1,14 @@
 // The home page: projects, samples, and the place to drop logs.
 
 import { get, post } from "./api.js";
+import { appearance } from "./appearance.js";
 import { placeholder, projectCard, sampleCard } from "./cards.js";
 import { byId, fill, h, text } from "./dom.js";
 import { create, showDeleted } from "./keeping.js";
 import { failed } from "./notices.js";
 import { dropZone } from "./upload.js";
 
+appearance(byId("appearance"));
 dropZone(byId("drop"), open);
 show(byId("projects"), listProjects);
 show(byId("samples"), listSamples);

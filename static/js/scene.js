@@ -1,26 +1,29 @@
 // The scene in the middle: an iframe of our own address.
 
+import { dark, watch } from "./appearance.js";
 import { byId, text } from "./dom.js";
 import { listen } from "./keys.js";
-
-const DARK = matchMedia("(prefers-color-scheme: dark)");
 
 /** Show the scene of a view, each time the view is opened; `actions` answer the keys there as they do in the page. */
 export function scene(view, actions) {
   const frame = byId("scene");
   view.addEventListener("opened", () => {
     cover("Loading the scene…");
-    frame.src = DARK.matches ? `${view.scene}?darkMode` : view.scene;
+    frame.src = dark() ? `${view.scene}?darkMode` : view.scene;
     theme(view);
   });
-  DARK.addEventListener("change", () => theme(view));
+  watch(() => theme(view));
   frame.addEventListener("load", () => loaded(frame, actions));
 }
 
-/** The colours of the scene follow the browser's, as those of the page do. */
+let telling = Promise.resolve();
+
+/** The colours of the scene follow the page; one is told after the other, so that the last one counts. */
 function theme(view) {
   if (view.shared) return; // its colours are those of whoever shares it
-  view.act("set_theme", DARK.matches ? "dark" : "light").catch((error) => view.project.tell("trouble", error));
+  telling = telling
+    .then(() => view.act("set_theme", dark() ? "dark" : "light"))
+    .catch((error) => view.project.tell("trouble", error));
 }
 
 /** Cover the scene with a sentence, or uncover it; `again` is offered as a button. */

@@ -106,7 +106,8 @@ def test_files(client):
 def test_colours_of_files_are_those_of_the_page():
     """Images and the player give each role one colour."""
     css = (static_folder() / "css" / "figures.css").read_text()
-    light = dict(re.findall(r"--((?:role|chain)-[\w-]+): (#\w{6});", css.split("@media")[0]))
+    light = dict(re.findall(r"--((?:role|chain)-[\w-]+): light-dark\((#\w{6}), #\w{6}\);", css))
+    assert len(light) == 17
     told = {name.removeprefix("role-"): colour for name, colour in light.items()}
     assert {name: ROLES[name] for name in told} == told
 

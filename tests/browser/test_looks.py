@@ -98,6 +98,50 @@ def test_home_page(desk: Any, server: Any, project: str) -> None:
     desk.errors.clear()
 
 
+def test_what_is_decided_is_in_sight(new_desk: Callable[..., Any], server: Any, project: str) -> None:
+    """In a low window details begin with the pair, not with its candidates; a candidate comes into sight."""
+    desk = new_desk(1280, 720)
+    top = "document.getElementById('panel-candidates').scrollTop"
+    desk.open(server.url + project)
+    assert desk.page.evaluate(top) == 0
+    desk.page.keyboard.press("n")
+    desk.page.wait_for_function(f"() => {top} > 0")
+    desk.page.keyboard.press("j")
+    desk.page.wait_for_function(f"() => {top} === 0")
+
+
+GROUNDS = """() => {
+  const scene = document.querySelector("#scene")?.contentDocument?.documentElement;
+  const ground = getComputedStyle(document.documentElement).backgroundColor.match(/\\d+/g).map(Number);
+  return [ground[0] < 100, ...(scene ? [scene.dataset.mantineColorScheme === "dark"] : [])];
+}"""
+"""whether the page is dark, and the scene in it"""
+
+
+def test_light_dark_or_as_the_system(new_desk: Callable[..., Any], server: Any, project: str) -> None:
+    """One button goes from the system's colours to light to dark; page, scene and player keep them, from the start."""
+    desk = new_desk(1280, 720)
+    page = desk.page
+    ground = "getComputedStyle(document.documentElement).backgroundColor"
+    calm(page, "light")
+    desk.open(server.url + project)
+    for says, dark in (("as the system", False), ("Colours: light", False), ("Colours: dark", True)):
+        assert says in page.locator("#appearance").get_attribute("aria-label")
+        page.wait_for_function(f"() => ({GROUNDS})().every((it) => it === {str(dark).lower()})")
+        page.locator("#appearance").click() if not dark else None
+    desk.picture("looks-chosen-dark")
+    page.add_init_script(f"requestAnimationFrame(() => window.first = {ground})")
+    for path in ("/", "/walk?sample=hall&pair=0.0-0.1&heuristic=random", project):
+        page.goto(server.url + path)
+        page.locator("#appearance svg").wait_for()
+        assert page.evaluate(GROUNDS)[0], path
+        assert page.evaluate("window.first") == page.evaluate(ground)
+    page.locator("#appearance").click()
+    page.wait_for_function(f"() => ({GROUNDS})().every((it) => !it)")
+    calm(page, "dark")
+    page.wait_for_function(f"() => ({GROUNDS})().every((it) => it)")
+
+
 def test_project_page(new_desk: Callable[..., Any], server: Any, project: str) -> None:
     """Every tab, menu, drawer and sheet of a project's page, and its scene, has nothing serious against it."""
     desk = new_desk(1440, 900)

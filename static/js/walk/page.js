@@ -1,6 +1,7 @@
 // The page of a walkthrough: what is walked through stands in the address, and so does the step that is shown.
 
 import { get } from "../api.js";
+import { appearance } from "../appearance.js";
 import { follow, teaching } from "./classes.js";
 import { byId, fill, h, text } from "../dom.js";
 import { failed } from "../notices.js";
@@ -21,6 +22,7 @@ let here = question;
 let player = null;
 let waiting = 0;
 
+appearance(byId("appearance"));
 (following ? follow(following, led) : start()).catch(unavailable);
 
 async function start() {
