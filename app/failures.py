@@ -62,7 +62,7 @@ async def _system(request: Request, error: Exception) -> Response:
     assert isinstance(error, OSError)
     if error.errno in NO_SPACE:
         return _failure(507, FULL, "DiskFull")
-    log.error("A request failed: %s %s", request.method, request.url.path, exc_info=error)
+    log.error("A request failed: %s %s", request.scope.get("method", "socket"), request.url.path, exc_info=error)
     return await _unexpected(request, error)
 
 

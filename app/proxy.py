@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Coroutine
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
@@ -93,7 +94,8 @@ async def socket(site: Site, view: str, browser: WebSocket) -> None:
         with site.views.watched(view):
             await _bridge(browser, await run_in_threadpool(_scene_of, site, browser, view))
     except UnknownError:
-        await browser.close(1008)
+        with suppress(OSError):  # whoever asked may be gone, too
+            await browser.close(1008)
 
 
 async def _fetch(port: int, path: str) -> httpx.Response:

@@ -35,11 +35,7 @@ def weakly_held(links: Sequence[Link], wholes: Sequence[Sequence[ScanId]]) -> di
     or what fits the robot's pace, may be where they are or not. Where two ways lead to them, one bears out the
     other: the links given are those that the optimiser does not silence.
     """
-    return {
-        scan: f"{len(part)} scans from {part[0]} on hang on the rest by a step that no accepted integration bears out."
-        for part, loose in loose_parts(links, wholes)
-        for scan in loose
-    }
+    return {scan: _said(part) for part, loose in loose_parts(links, wholes) for scan in loose}
 
 
 def loose_parts(
@@ -55,6 +51,11 @@ def loose_parts(
         held &= {scan for part in parts if not homes.isdisjoint(part) for scan in part}
     loose = components([link.edge for link in links if link.why in FIRM], set(scans) - held)
     return [(part, own) for part in loose if (own := tuple(scan for scan in part if scan not in held))]
+
+
+def _said(part: Sequence[ScanId]) -> str:
+    who = f"scan {part[0]} hangs" if len(part) == 1 else f"{len(part)} scans from {part[0]} on hang"
+    return f"{who} on the rest by a step that no accepted integration bears out."
 
 
 def _homes(parts: Sequence[Sequence[ScanId]], wholes: Sequence[Sequence[ScanId]]) -> set[ScanId]:

@@ -8,7 +8,8 @@ centimetres, everything here is in metres and radians.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -16,6 +17,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from segmap.errors import ParameterError
 
 __all__ = ["PRESETS", "Parameters", "describe", "preset"]
+
+
+def _instead(name: str, known: Iterable[str]) -> str:
+    """What could be meant by a name that is none."""
+    near = get_close_matches(name, known, cutoff=0.5)
+    meant = f"Did you mean {' or '.join(near)}? " if near else ""
+    return f"{meant}Parameters are: {', '.join(known)}."
 
 
 def _parameter(default: Any, unit: str, help: str, **bounds: float) -> Any:
@@ -225,8 +233,9 @@ class Parameters(BaseModel):
         """
         unknown = sorted(set(changes) - set(type(self).model_fields))
         if unknown:
-            known = ", ".join(type(self).model_fields)
-            raise ParameterError(f"There is no parameter {unknown[0]!r}. Parameters are: {known}.")
+            raise ParameterError(
+                f"There is no parameter {unknown[0]!r}. {_instead(unknown[0], type(self).model_fields)}"
+            )
         try:
             return type(self)(**{**self.model_dump(), **changes})
         except ValidationError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -24,6 +25,7 @@ __all__ = [
     "judge",
     "judge_evidence",
     "judge_value",
+    "told",
 ]
 
 
@@ -55,6 +57,8 @@ class Findings:
     """metres: the score of the best pose that a prior excludes"""
 
 
+MOST_DIGITS = 9
+"""of a number that is told"""
 AS_WELL = 0.05
 """a rival agrees as well when its agreement is at most this much less"""
 RIVAL_SHARE = 0.7
@@ -148,9 +152,24 @@ def clear(findings: Findings, parameters: Parameters) -> bool:
 def judge_value(value: float, parameters: Parameters) -> tuple[Verdict, tuple[str, ...]]:
     """The paper's rule: valid only above the threshold (IV-B, V-B)."""
     threshold = parameters.value_threshold
+    said = told(value, threshold, 2, inclusive=False)
     if value > threshold:
-        return Verdict.ACCEPTED, (f"The value, {value:.2f} m, is above the threshold of {threshold:.2f} m.",)
-    return Verdict.REJECTED, (f"The best value, {value:.2f} m, is not above the threshold of {threshold:.2f} m.",)
+        return Verdict.ACCEPTED, (f"The value, {said} m, is above the threshold of {threshold:.2f} m.",)
+    return Verdict.REJECTED, (f"The best value, {said} m, is not above the threshold of {threshold:.2f} m.",)
+
+
+def told(number: float, limit: float, digits: int, *, inclusive: bool = True) -> str:
+    """A number rounded for reading, but never across the limit it is compared with: with more digits there.
+
+    ``inclusive``: whether the limit itself is enough.
+
+    >>> told(0.8999, 0.9, 2), told(0.8912, 0.9, 2), told(4.001, 4.0, 2, inclusive=False)
+    ('0.8999', '0.89', '4.001')
+    """
+    passes = operator.ge if inclusive else operator.gt
+    while digits < MOST_DIGITS and passes(round(number, digits), limit) != passes(number, limit):
+        digits += 1
+    return f"{number:.{digits}f}"
 
 
 def judge_evidence(value: float, findings: Findings, parameters: Parameters) -> tuple[Verdict, tuple[str, ...]]:
@@ -173,10 +192,13 @@ def judge_evidence(value: float, findings: Findings, parameters: Parameters) -> 
 
 def _certainty(sure: float, parameters: Parameters) -> str:
     if sure >= parameters.confidence_accept:
-        return f"Confidence {sure:.3f}: at or above {parameters.confidence_accept:g}."
+        return (
+            f"Confidence {told(sure, parameters.confidence_accept, 3)}: at or above {parameters.confidence_accept:g}."
+        )
     if sure >= parameters.confidence_review:
-        return f"Confidence {sure:.3f}: between {parameters.confidence_review:g} and {parameters.confidence_accept:g}."
-    return f"Confidence {sure:.3f}: below {parameters.confidence_review:g}."
+        said = told(sure, parameters.confidence_accept, 3)
+        return f"Confidence {said}: between {parameters.confidence_review:g} and {parameters.confidence_accept:g}."
+    return f"Confidence {told(sure, parameters.confidence_review, 3)}: below {parameters.confidence_review:g}."
 
 
 def _doubts(findings: Findings, parameters: Parameters) -> tuple[str, ...]:

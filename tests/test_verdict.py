@@ -22,6 +22,7 @@ from segmap.verdict import (
     judge,
     judge_evidence,
     judge_value,
+    told,
 )
 from segmap.visibility import Evidence
 
@@ -31,6 +32,14 @@ CLEAR = Findings(score=15.0, gap=12.0, evidence=Evidence(18.0, 0.2, 0.8, 6.0, 3.
 RANK = {Verdict.REJECTED: 0, Verdict.REVIEW: 1, Verdict.ACCEPTED: 2}
 quick = settings(deadline=None, max_examples=150)
 metres = st.floats(0.0, 40.0)
+
+
+@given(number=st.floats(0.0, 1.0), limit=st.sampled_from([0.1, 0.5, 0.9]), inclusive=st.booleans())
+def test_no_number_is_rounded_across_its_limit(number, limit, inclusive):
+    """What is told of a number is on the side of the limit that the number is on."""
+    assume(abs(number - limit) > 1e-8 or number == limit)
+    read = float(told(number, limit, 2, inclusive=inclusive))
+    assert (read >= limit) == (number >= limit) if inclusive else (read > limit) == (number > limit)
 
 
 @st.composite

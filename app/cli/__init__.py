@@ -6,9 +6,10 @@ for bad usage or input; whatever segmap raises on purpose is one line, never a t
 
 from __future__ import annotations
 
+import inspect
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated
 
 import typer
@@ -41,21 +42,29 @@ cli = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
-cli.command()(projects.serve)
-cli.command()(inspecting.info)
-cli.command()(inspecting.segments)
-cli.command()(integrating.integrate)
-cli.command()(merging.merge)
-cli.command("map")(mapping.map_logs)
-cli.command()(projects.export)
-cli.command()(projects.report)
-cli.command()(projects.replay)
-cli.command()(searching.loops)
+
+
+def _add(command: Callable[..., None], name: str | None = None) -> None:
+    """A command with its docstring as help: lines of a paragraph flow, however wide the terminal is."""
+    paragraphs = (inspect.getdoc(command) or "").split("\n\n")
+    cli.command(name, help="\n\n".join(" ".join(one.split()) for one in paragraphs))(command)
+
+
+_add(projects.serve)
+_add(inspecting.info)
+_add(inspecting.segments)
+_add(integrating.integrate)
+_add(merging.merge)
+_add(mapping.map_logs, "map")
+_add(projects.export)
+_add(projects.report)
+_add(projects.replay)
+_add(searching.loops)
 cli.add_typer(public_data.datasets)
 cli.add_typer(benchmarking.benchmark)
-cli.command()(evaluating.evaluate)
-cli.command()(walking.walkthrough)
-cli.command()(projects.sample)
+_add(evaluating.evaluate)
+_add(walking.walkthrough)
+_add(projects.sample)
 
 
 def _version(wanted: bool) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict
 from typing import Any
 
 import typer
@@ -12,6 +13,7 @@ from app.cli.output import print_table
 from segmap.explanation import Explanation, PairTerm, SegmentTerm
 from segmap.integration import Match, findings_of
 from segmap.verdict import confidence_terms
+from segmap.visibility import Evidence
 
 __all__ = ["explanation_json", "print_explanation"]
 
@@ -68,13 +70,13 @@ def _print_crossings(explanation: Explanation) -> None:
 def _print_score(explanation: Explanation) -> None:
     if explanation.score is None or explanation.terms is None or explanation.sights is None:
         return
-    typer.echo(f"\nscore {explanation.score:.3f} m = {_sum(explanation.terms)}")
+    typer.echo(f"\nscore {explanation.score:.3f} m = {_weighted(explanation.terms, explanation.evidence)}")
     worst = sorted(
         ((which, term) for which, side in enumerate(explanation.sights, 1) for term in side.segments),
         key=lambda entry: entry[1].score,
     )
     rows = [(_where(which, term), *_metres(term)) for which, term in worst[:SHOWN]]
-    print_table(("worst segments", "score m", "supported", "contradicted", "shadowed", "unseen"), rows)
+    print_table(("worst segments", "score m", "supported m", "contradicted m", "shadowed m", "unseen m"), rows)
 
 
 def _where(which: int, term: SegmentTerm) -> str:
@@ -87,6 +89,25 @@ def _metres(term: SegmentTerm) -> tuple[str, ...]:
     return tuple(f"{part:.2f}" for part in parts)
 
 
+def _weighted(terms: dict[str, float], evidence: Evidence | None) -> str:
+    """What a score is made of: the metres of each kind of evidence, with the weight they have where it is not one.
+
+    >>> _weighted({"supported": 2.0, "contradicted": -0.5}, Evidence(2.0, 0.25, 0.0, 0.0, 0.0, 0.0))
+    '2.00 supported - 2 x 0.25 contradicted'
+    """
+    seen = {} if evidence is None else asdict(evidence)
+    weights = {name: abs(term) / seen[name] if seen.get(name) else 1.0 for name, term in terms.items()}
+    text = " ".join(
+        f"{'-' if term < 0.0 else '+'} {_times(weights[name])}{abs(term) / weights[name]:.2f} {name}"
+        for name, term in terms.items()
+    )
+    return text.removeprefix("+ ")
+
+
+def _times(weight: float) -> str:
+    return "" if math.isclose(weight, 1.0) else f"{weight:g} x "
+
+
 def _sum(terms: dict[str, float]) -> str:
     """Terms in a row, each with its sign.
 
@@ -94,4 +115,4 @@ def _sum(terms: dict[str, float]) -> str:
     '2.00 supported - 0.50 contradicted'
     """
     text = " ".join(f"{'-' if term < 0.0 else '+'} {abs(term):.2f} {name}" for name, term in terms.items())
-    return text.removeprefix("+ ")
+    return text.replace("- ", "-", 1) if text.startswith("-") else text.removeprefix("+ ")

@@ -10,8 +10,8 @@ import typer
 from app.cli.clusters import cluster
 from app.cli.options import Dask, Json, Logs, Out, Preset, Setting, Trajectory, Workers, method_of, read_all
 from app.cli.output import print_json, print_table, progress
-from app.cli.writing import described, listed, times_of, write_trajectory
-from segmap.export import Content, by_suffix, write_files
+from app.cli.writing import check_places, described, listed, times_of, write_trajectory
+from segmap.export import Content, write_files
 from segmap.mapping import WholeMap, fused, map_scans
 from segmap.merging import Component, map_hash
 from segmap.scans import ScanId
@@ -36,8 +36,7 @@ def map_logs(
     own, and what hangs on the rest without an accepted integration is told.
     """
     by = method_of("verified", None, preset, settings)
-    for path in out or []:
-        by_suffix(path)
+    check_places(out or [], trajectory)
     laser_logs = [log for path in logs for log in read_all(path)]
     maps = {
         ScanId(number, index): extract(scan, by.parameters, number, index)
@@ -74,7 +73,7 @@ def _report(title: str, whole: WholeMap, parts: tuple[Component, ...], as_json: 
     silenced = len(whole.optimised.silenced)
     typer.echo(
         f"{title}: {len(whole.keys)} keyframes of {len(whole.scans)} scans, {len(whole.matches)} pairs matched, "
-        f"{len(whole.links)} links, {silenced} of them silenced, {len(parts)} components"
+        f"{len(whole.links)} links, {silenced} of them silenced, {len(parts)} component{'' if len(parts) == 1 else 's'}"
     )
     rows = [(part.name, str(len(part.scans)), str(len(part.map)), f"{part.map.lengths.sum():.1f}") for part in parts]
     print_table(("component", "scans", "segments", "length [m]"), rows)

@@ -29,10 +29,10 @@ from app.cli.options import (
     topic_of,
 )
 from app.cli.output import pose_json, print_json, print_table, progress
-from app.cli.writing import described, edges_between, listed, new_project, times_of, write_trajectory
+from app.cli.writing import check_places, described, edges_between, listed, new_project, times_of, write_trajectory
 from segmap.errors import ParameterError, ProjectError
 from segmap.events import IntegrationId
-from segmap.export import Content, by_suffix, write_files
+from segmap.export import Content, write_files
 from segmap.fusion import fuse_all
 from segmap.integration import Match, Verdict
 from segmap.merging import METHODS, Call, Component, Merge, MergeStep, Pair, calls_needed, map_hash
@@ -81,7 +81,7 @@ def merge(
     A project keeps the accepted integrations of scans, and makes its map of them by the pivot method.
     """
     by = method_of(mode, heuristic, preset, settings)
-    _check_places(out or [], project)
+    _check_places(out or [], trajectory, project)
     sources = [(topic_of(path)[0], log) for path in logs for log in read_all(path)]
     task = _Task([log for _, log in sources], by, method, stride)
     task.check_calls(most_calls)
@@ -97,10 +97,9 @@ def merge(
     _report(merged, as_json)
 
 
-def _check_places(out: Sequence[Path], project: Path | None) -> None:
+def _check_places(out: Sequence[Path], trajectory: Path | None, project: Path | None) -> None:
     """Say before the work what could not be written after it."""
-    for path in out:
-        by_suffix(path)
+    check_places(out, trajectory, project)
     if project is not None and project.exists():
         raise ProjectError(f"{project} is there already: choose another name, or open it with segmap serve.")
 

@@ -15,7 +15,9 @@ from app.matching import Settings, recall
 from app.merged import exportable, merge_project
 from app.posegraph import Solver, graph_of
 from app.reporting import Reporter
+from segmap.errors import ExportError
 from segmap.export import FORMATS, RESOLUTION, ExportFormat, format_of, write_files
+from segmap.export.files import check_place
 from segmap.simulate import write_samples
 from segmap.store import Store
 
@@ -69,6 +71,8 @@ def export(
     if to == WALKTHROUGH:
         walking.of_project(project, out)
         return
+    if to not in FORMATS:
+        raise ExportError(f"There is no format {to!r}. Formats are: {', '.join((*FORMATS, WALKTHROUGH))}.")
     _write(project, out, format_of(to), resolution)
 
 
@@ -84,6 +88,7 @@ def report(
 
 
 def _write(project: Path, out: Path, kind: ExportFormat, resolution: float = RESOLUTION) -> None:
+    check_place(out)
     with Store.open(project) as store:
         state, solve = store.state, Solver()
         inputs = Inputs(store, state.logs, store.log_bytes)
@@ -94,7 +99,8 @@ def _write(project: Path, out: Path, kind: ExportFormat, resolution: float = RES
             reporter = Reporter(inputs.segment_map, found, inputs.facts)
             record = reporter.record(state, graph_of(state, solve), inputs.scan_ids)
         content = exportable(state, merged, lambda scan: inputs.scan(scan).time, out.stem, resolution, record)
-        write_files(content, out, kind.name)
+        for path in write_files(content, out, kind.name):
+            typer.echo(path)
 
 
 def replay(project: Project) -> None:

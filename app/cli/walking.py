@@ -27,6 +27,7 @@ from app.inputs import Inputs
 from app.posegraph import edges_of
 from app.walk_files import KINDS, MOST_FRAMES, walk_file
 from app.walks import MOST_MERGED
+from segmap.export.files import check_place, write_whole
 from segmap.logs import holds_maps
 from segmap.scans import ScanId
 from segmap.store import Store
@@ -98,12 +99,13 @@ def _kind(out: Path) -> str:
     kind = out.suffix.lower().removeprefix(".")
     if kind not in KINDS:
         raise RequestError(f"{out.name}: a walkthrough is written as .{', .'.join(KINDS)}. Choose one of these.")
+    check_place(out)
     return kind
 
 
 def _write(made: Walkthrough, out: Path, kind: str, stage: str = "", pictures: int = MOST_FRAMES) -> None:
     file = walk_file(made, kind, stage, pictures)
-    out.write_bytes(file.content)
+    write_whole(out, file.content)
     typer.echo(f"{out}: {len(made.stages)} stages, {len(file.content) / 1e6:.1f} MB")
 
 

@@ -14,7 +14,8 @@ from app.posegraph import edge
 from app.resources import program_version
 from segmap.errors import LogError
 from segmap.events import Choice, Covariance, Decide, IntegrationId, fingerprint
-from segmap.export import Content, write_files
+from segmap.export import Content, by_suffix, write_files
+from segmap.export.files import check_place
 from segmap.export.tum import left_out
 from segmap.graph import Edge
 from segmap.integration import Match
@@ -23,10 +24,23 @@ from segmap.parameters import Parameters
 from segmap.scans import LaserLog, ScanId
 from segmap.store import Store
 
-__all__ = ["described", "edges_between", "listed", "new_project", "times_of", "write_trajectory"]
+__all__ = ["check_places", "described", "edges_between", "listed", "new_project", "times_of", "write_trajectory"]
 
 COMMAND = "segmap merge"
 """who decided, in the history of a project"""
+
+
+def check_places(out: Sequence[Path], *others: Path | None) -> None:
+    """Say before the work what could not be written after it: maps, whose suffix says the format, and other files.
+
+    Raises:
+        ExportError: a suffix says no format, or a file cannot be where it should.
+    """
+    for path in out:
+        by_suffix(path)
+    for path in (*out, *others):
+        if path is not None:
+            check_place(path)
 
 
 def described(title: str, hash: str) -> dict[str, str]:

@@ -14,6 +14,7 @@ from typing import Any
 from app.palette import PALETTES, hexadecimal
 from app.sights import CLASSES
 from segmap.export import FORMATS
+from segmap.verdict import told as rounded
 
 __all__ = ["candidate", "exports", "heuristics", "legend", "messages", "picked", "step", "value"]
 
@@ -78,8 +79,9 @@ def _judged(snapshot: Snapshot) -> str:
     if snapshot["candidate"] is None or held is None:
         return f'<span style="{FAINT}">No {criterion["quantity"]} yet. Threshold {_amount(threshold, criterion)}</span>'
     words, colour = _side(snapshot, held)
+    amount = _told(held, threshold, criterion)
     told = (
-        f'<div style="{NUMBERS}"><span style="font-size:1.5em;font-weight:650">{_amount(held, criterion)}</span> '
+        f'<div style="{NUMBERS}"><span style="font-size:1.5em;font-weight:650">{amount}</span> '
         f'<span style="color:{colour};font-weight:600">{words} the threshold</span> '
         f'<span style="{FAINT}">of {_amount(threshold, criterion)}</span></div>'
     )
@@ -117,6 +119,12 @@ def _doubts(snapshot: Snapshot, colour: str) -> str:
         return ""
     reasons = "".join(f"<div>{_text(reason)}</div>" for reason in snapshot["reasons"])
     return f'<div style="border-left:3px solid {colour};padding:0 8px;margin:4px 0">{reasons}</div>'
+
+
+def _told(held: float, threshold: float, criterion: Snapshot) -> str:
+    """As ``_amount``, but never rounded across the threshold."""
+    said = rounded(held, threshold, 2, inclusive=criterion["inclusive"])
+    return f"{said} {_text(criterion['unit'] or criterion['quantity'])}"
 
 
 def _amount(number: float, criterion: Snapshot) -> str:

@@ -14,7 +14,7 @@ from pathlib import Path
 from segmap.errors import ExportError
 from segmap.export.components import RESOLUTION, Content, ExportFormat, Files, MapComponent
 from segmap.export.dxf import DXF
-from segmap.export.files import packed, write_whole
+from segmap.export.files import check_place, packed, write_whole
 from segmap.export.g2o import G2O
 from segmap.export.geojson import GEOJSON
 from segmap.export.png import PNG
@@ -105,12 +105,15 @@ def write_map(
     write_files(Content(components, metadata or {}, integrations), path, format)
 
 
-def write_files(content: Content, path: str | os.PathLike[str], format: str | None = None) -> None:
+def write_files(content: Content, path: str | os.PathLike[str], format: str | None = None) -> tuple[Path, ...]:
     """The same for content that is put together already; its ``stem`` is taken from the path.
+
+    Gives the files that were written, the one that was named first.
 
     Raises:
         ExportError: as for ``write_map``.
     """
+    check_place(path)
     target = Path(path)
     kind = format_of(format or by_suffix(target))
     files = dict(export_files(replace(content, stem=target.stem), kind.name))
@@ -118,6 +121,7 @@ def write_files(content: Content, path: str | os.PathLike[str], format: str | No
         files = {target.name: files.pop(next(iter(files))), **files}
     for name in reversed(files):  # what the first one points to is there before it
         write_whole(target.with_name(name), files[name])
+    return tuple(target.with_name(name) for name in files)
 
 
 def format_of(name: str) -> ExportFormat:

@@ -185,7 +185,8 @@ def _format_of(head: bytes, file: LogFile) -> Format:
     cut = f", and the file is {file.damage}" if file.damage else ""
     start = head.split(b"\n", 1)[0].strip()
     found = "it is binary" if b"\0" in head else f"line 1 starts with {shown(start)}"
-    expected = " or ".join(format.expects for format in FORMATS)
+    *others, last = (format.expects for format in FORMATS)
+    expected = f"{', '.join(others)} or {last}"
     raise LogError(
         f"{file.name} is no laser log that segmap reads: {found}{cut}. Expected {expected}, plain or gzipped."
     )

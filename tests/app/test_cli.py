@@ -317,6 +317,35 @@ def test_no_transformation_is_a_result(run: Run, document: Callable[..., Any], t
 # --- merging and projects -------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("command", [("merge",), ("map",)])
+def test_what_cannot_be_written_is_told_before_the_work(command: tuple[str, ...], run: Run, tmp_path: Path) -> None:
+    """Not after it: no log is so much as read."""
+    for option in ("--out", "--trajectory"):
+        where = tmp_path / "missing" / "map.svg"
+        status, out, err = run(*command, tmp_path / "no.log", option, where)
+        assert (status, out) == (2, "")
+        assert "there is no folder" in err
+
+
+def test_names_that_are_none(run: Run, tmp_path: Path) -> None:
+    """What could have been meant is told: parameters much alike, and every format that export knows."""
+    _, _, err = run("integrate", FIRST, 0, 1, "--set", "angle_tolerance=1")
+    assert "Did you mean" in err.split("angle_difference_tolerance")[0]
+    _, _, err = run("export", tmp_path / "no.segmap", "--to", "dwg", "--out", tmp_path / "map.dwg")
+    assert "ros, dxf, svg," in err
+    assert "report, walkthrough." in err
+
+
+def test_help_flows(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Paragraphs of a help are as wide as the terminal lets them be, whatever the lines of the source."""
+    monkeypatch.setenv("COLUMNS", "72")
+    _, out, _ = run("map", "--help")
+    told = out.split("LOGS...")[1].split("Arguments")[0].rsplit("\n", 1)[0]
+    paragraphs = [lines for one in re.split(r"\n\s*\n", told) if (lines := one.strip().splitlines())]
+    assert len(paragraphs) >= 2
+    assert all(len(line) > 50 for lines in paragraphs for line in lines[:-1])
+
+
 @pytest.fixture
 def merged(document: Callable[..., Any], tmp_path: Path) -> Any:
     """Both robots' logs merged, with everything that can be written."""
@@ -330,7 +359,7 @@ def test_merge_replay_and_export_agree(merged: Any, run: Run, tmp_path: Path) ->
     assert run("replay", tmp_path / "map.segmap") == (0, f"{merged['hash']}\n", "")
     for format in FORMATS.values():
         to = tmp_path / f"again{format.suffix}"
-        assert run("export", tmp_path / "map.segmap", "--to", format.name, "--out", to)[:2] == (0, "")
+        assert run("export", tmp_path / "map.segmap", "--to", format.name, "--out", to)[0] == 0
         assert to.stat().st_size > 0
     features = [json.loads((tmp_path / name).read_text())["features"] for name in ("map.geojson", "again.geojson")]
     assert features[0] == features[1]

@@ -68,7 +68,7 @@ def test_without_json_it_tells_a_person(run: Run, monkeypatch: pytest.MonkeyPatc
     count = len(held["whole"].scans)
     assert f"keyframes of {count} scans" in out
     assert "component 1" in out
-    assert "to be looked at: 1 scans from" in out
+    assert "to be looked at: scan 0.56 hangs" in out
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import httpx
@@ -18,7 +19,9 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
+from app import proxy
 from app.dressing import SCRIPT
+from app.errors import UnknownError
 from app.proxy import POLICY
 from app.server import create_app
 from app.workspace import Workspace
@@ -178,6 +181,25 @@ def test_a_closed_view_ends_its_socket(site: tuple[str, str]) -> None:
         with pytest.raises(ConnectionClosed):
             _read_to_the_end(joined)
     assert httpx.get(f"http://{host}{made['scene']}").status_code == 404
+
+
+class _Gone:
+    """A browser that left before it was answered."""
+
+    headers = MappingProxyType[str, str]({})
+
+    async def close(self, _: int) -> None:
+        raise OSError("nobody is there")
+
+
+def test_a_closed_view_for_a_browser_that_left() -> None:
+    """Neither side is there any more: nothing to tell anybody, and no error."""
+
+    def watched(_: str) -> None:
+        raise UnknownError("closed")
+
+    site: Any = SimpleNamespace(views=SimpleNamespace(watched=watched))
+    asyncio.run(proxy.socket(site, "x", _Gone()))  # type: ignore[arg-type]
 
 
 def _read_to_the_end(joined: ClientConnection) -> None:
