@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from app.resources import samples_folder
-from segmap.integration import integrate
+from segmap.integration import integrate, match_maps
 from segmap.logs import read_log
 from segmap.parameters import Parameters, preset
 from segmap.pose import Pose2
+from segmap.scans import ScanId
 from segmap.segments import SegmentMap, extract
-from segmap.walkthrough import ALGORITHMS, walk_maps, walk_scans
+from segmap.walkthrough import ALGORITHMS, walk_maps, walk_merge, walk_scans
 
 WAYS = [("paper", name) for name in ("all", "consecutive", "random", "histogram")]
 WAYS += [("verified", name) for name in (None, "extremes")]
@@ -200,3 +201,33 @@ def test_nothing_to_see_is_said():
     assert [stage.id for stage in walk.stages][-1] == "result"
     last = walk.stages[-1]
     assert "no segments" in last.step(last.count - 1).say
+
+
+def test_the_pivot_method_is_entered_where_it_integrated():
+    """Its maps grow, but INTEGRATE is called on two neighbours alone: told, and gone into, is that call."""
+    log, parameters = read_log(samples_folder() / "hall.log"), preset("verified")
+    maps = {ScanId(0, k): extract(log[k], parameters, 0, k) for k in range(4)}
+    made = walk_merge(maps, parameters, None, "verified")
+    step = made.walk.stage("pivot").step(2)
+    match = match_maps(maps[ScanId(0, 1)], maps[ScanId(0, 2)], parameters, None, "verified")
+    assert f"saw scan 1 and scan 2 alone, and gave them a value of {match.value:.2f} m" in step.say
+    entered = made.enter(step.enter["node"])
+    assert entered.walk.title == "scan 1 with scan 2"
+    assert "INTEGRATE gave it" in made.walk.stage("sequential").step(2).say
+    assert (
+        "the map of scans 0 to 1 with scan 2"
+        in made.enter(made.walk.stage("sequential").step(2).enter["node"]).walk.title
+    )
+
+
+def test_what_could_not_be_joined_is_told():
+    """Scans of two rooms end in two maps: the plan says of which scans, and which of them the picture shows."""
+    parameters = preset("verified")
+    near, far = (read_log(samples_folder() / name) for name in ("hall.log", "laboratory.log"))
+    scans = [near[0], near[1], far[40], far[41]]
+    maps = {ScanId(0, k): extract(scan, parameters, 0, k) for k, scan in enumerate(scans)}
+    made = walk_merge(maps, parameters, None, "verified")
+    assert "2 maps are left, of scans 0 to 1 and of scans 2 to 3; the picture shows the first" in (
+        made.walk.stage("pivot").step(0).say
+    )
+    assert "the numbers are of all" in made.walk.stage("comparison").step(2).say

@@ -41,6 +41,7 @@ UNKNOWN: Covariance = ((0.01, 0.0, 0.0), (0.0, 0.01, 0.0), (0.0, 0.0, math.radia
 """of a pose of paper mode, which does not say how sure it is"""
 MOST = 300
 """steps that are shown"""
+MILLIMETRE = 0.001
 SILENT = 0.5
 """a smaller weight"""
 
@@ -152,16 +153,26 @@ class _Rounds:
         say = (
             f"The end: every scan is where the integrations that count want it. {_silenced(silent)}"
             if end
-            else "The beginning: the scans stand where the surest integrations put them, one after the other."
+            else self._beginning()
             if k == 0
-            else f"Step {k}: the scans moved by up to {moved:.3f} m. {_silenced(silent)}"
-            " Look at the strokes between the scans: green ones count, red ones are silenced."
+            else f"Step {k}: {_moved(moved)} {_silenced(silent)}"
         )
         told = (metres("moved by at most", moved), ("silenced", str(silent), f"of {len(self.edges)}"))
         left = ("left over, squared standard deviations", f"{self._error(k):.2f}", "")
         line = "5" if end else "2" if k == 0 else "4" if silent else "3"
         at = (float(k), round(self._error(k), 3))
         return Step(line, say, tuple(self._shapes(poses, weights)), (*told, left), at=at)
+
+    def _beginning(self) -> str:
+        beyond = any(abs(edge.second.scan - edge.first.scan) > 1 for edge in self.edges)
+        alone = sum(scan not in self._number for scan in self.maps)
+        return (
+            f"The beginning: {len(self.edges)} integrations hold {len(self.scans)} scans together"
+            f"{', those of scans that are no neighbours included' if beyond else ''}. A dot is where a sensor stood, a"
+            " stroke an integration: green ones count, dashed red ones are silenced. The scans stand where the surest"
+            " integrations put them, one after the other."
+            f"{f' Left out, as nothing ties them to these: {alone} more.' if alone else ''}"
+        )
 
     def _shapes(self, poses: FloatArray, weights: FloatArray) -> list[Shape]:
         shapes = [
@@ -176,7 +187,15 @@ class _Rounds:
         return [*shapes, points(poses[:, :2], "first", size=8)]
 
 
+def _moved(length: float) -> str:
+    if length < MILLIMETRE / 2.0:
+        return "no scan moves by as much as a millimetre any more."
+    return f"the scans moved by up to {length:.3f} m."
+
+
 def _silenced(count: int) -> str:
     if not count:
         return "No integration is silenced."
-    return f"{count} integration{'' if count == 1 else 's'} contradict{'s' if count == 1 else ''} the others."
+    if count == 1:
+        return "1 integration is silenced, as the others contradict it."
+    return f"{count} integrations are silenced, as the others contradict them."

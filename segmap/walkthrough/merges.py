@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from segmap import tracing
 from segmap.fusion import spurious_length, spurious_stretches
-from segmap.merging import METHODS, Merge, MergeNode, merge
+from segmap.merging import METHODS, Merge, MergeNode, MergeStep, merge
 from segmap.parameters import Parameters
 from segmap.scans import ScanId
 from segmap.segments import SegmentMap
@@ -20,12 +20,18 @@ from segmap.walkthrough.steps import Mark, Quantity, Stage, Step, Walkthrough, a
 __all__ = ["MergeWalk", "walk_merge"]
 
 ABOUT = {
-    "sequential": "Each new scan is integrated with the whole map so far. The larger the map, the more there is in it"
-    " that a small scan may be mistaken for.",
-    "tree": "Neighbours are integrated, then the results with their neighbours, and so on. The maps are always of one"
-    " size, but the same walls are fused again and again: doubled walls pile up.",
+    "sequential": "Each new scan is integrated with the whole map so far. The larger the map, the longer that takes,"
+    " and the more there is in it that a small scan may be mistaken for.",
+    "tree": "Neighbours are integrated, then the results with their neighbours, and so on. The two are always about"
+    " as large as each other, but the same walls are fused again and again: doubled walls pile up.",
     "pivot": "Neighbours are integrated only to learn how each scan lies on the one before it. The motions are composed"
-    " and each scan is fused once: as few integrations as the sequential method, and fewer doubled walls.",
+    " and each scan is fused once: as few integrations as the sequential method, of two scans each, and as a rule fewer"
+    " doubled walls than the tree method.",
+}
+DOTS = {
+    "sequential": "is a call of INTEGRATE, which finds how a scan lies on the map so far and fuses them",
+    "tree": "is a call of INTEGRATE, which finds how two maps lie on each other and fuses them",
+    "pivot": "is a scan fused with the map so far, where a call of INTEGRATE on it and its neighbour alone has it",
 }
 LINES = {"sequential": ("1", "3"), "tree": ("1", "3"), "pivot": ("1", "6")}
 
@@ -48,7 +54,7 @@ class MergeWalk:
         node = nodes[int(number)] if int(number) < len(nodes) else None
         if node is None or node.step is None or node.step.match is None:
             return None
-        first, second = node.step.first, node.step.second
+        first, second = _integrated(method, node, node.step)
         title = f"{_name(first)} with {_name(second)}"
         return walk_maps(first.map, second.map, self.parameters, node.step.match.heuristic, self.mode, title)
 
@@ -85,6 +91,17 @@ def _nodes(made: Merge) -> list[MergeNode]:
         for node in part.tree.nodes() if part.tree else ():
             found.setdefault(id(node), node)
     return list(found.values())
+
+
+def _integrated(method: str, node: MergeNode, step: MergeStep) -> tuple[MergeNode, MergeNode]:
+    """What INTEGRATE was called on: the two maps that became one, or of the pivot method the neighbours alone."""
+    first, second = (node.leaf(scan) for scan in step.pair) if method == "pivot" else (None, None)
+    return first or step.first, second or step.second
+
+
+def _spoken(scans: Sequence[ScanId]) -> str:
+    numbers = sorted(scan.scan for scan in scans)
+    return f"scan {numbers[0]}" if len(numbers) == 1 else f"scans {numbers[0]} to {numbers[-1]}"
 
 
 def _name(node: MergeNode) -> str:
@@ -126,11 +143,13 @@ class _Method:
     def _plan(self) -> Step:
         scans = [scan for part in self.made.components for scan in part.scans]
         say = (
-            f"{len(scans)} scans. The small picture shows which maps become one: each dot below the first row is a call"
-            " of INTEGRATE, which finds how two maps lie on each other and fuses them. Click one, then go into it."
+            f"{len(scans)} scans, and the map they end in. The small picture shows which maps become one: each dot"
+            f" below the first row {DOTS[self.method]}. Click one, then go into it."
         )
         if len(self.made.components) > 1:
-            say += f" Not everything could be joined: {len(self.made.components)} maps are left."
+            left = " and of ".join(_spoken(part.scans) for part in self.made.components)
+            say += f" Not everything could be joined: {len(self.made.components)} maps are left, of {left}; the picture"
+            say += " shows the first. Calls that found nothing have no dot."
         shapes = [lines(part.map.coordinates, "first", width=2) for part in self.made.components[:1]]
         return Step(LINES[self.method][0], say, tuple(shapes), self._counts())
 
@@ -147,9 +166,8 @@ class _Method:
         shapes = [lines(first.map.coordinates, "first", width=2.5)]
         shapes += [lines(second.map.moved(T_1_2).coordinates, "second", width=1.8), lines(doubled, "bad", width=6)]
         match = node.step.match
-        known = "" if match is None else f" INTEGRATE gave it a value of {match.value:.2f} m."
         say = (
-            f"{_capital(_name(first))} (blue) and {_name(second)} (orange) become one.{known}"
+            f"{_capital(_name(first))} (blue) and {_name(second)} (orange) become one.{self._known(node, node.step)}"
             f" {'Red: walls that are in the new map twice.' if len(doubled) else 'No wall is doubled.'}"
             f" {' '.join(node.step.remarks)}"
         ).strip()
@@ -166,6 +184,20 @@ class _Method:
             box=around(node.map.coordinates),
             at=(float(number), 0.0),
             enter=enter,
+        )
+
+    def _known(self, node: MergeNode, step: MergeStep) -> str:
+        """Where the pose comes from."""
+        if step.match is None:
+            return ""
+        value = f"a value of {step.match.value:.2f} m"
+        parts = _integrated(self.method, node, step)
+        if parts[0] is step.first:
+            return f" INTEGRATE gave it {value}."
+        alone, other = (_name(part) for part in parts)
+        return (
+            f" INTEGRATE saw {alone} and {other} alone, and gave them {value}; composed with where {alone} lies"
+            f" already, that is where {other} lies."
         )
 
     def chart(self) -> dict[str, object]:
@@ -220,21 +252,22 @@ def _comparison(merges: Mapping[str, Merge]) -> Stage:
         shapes += [lines(spurious_stretches(part.map), "bad", width=5) for part in made.components[:1]]
         say = (
             f"{names[k].capitalize()}: {len(made.calls)} calls of INTEGRATE, {rows} segments, {length:.2f} m of wall"
-            " twice in the map (red). Compare it with the other two."
+            " twice in the map (red)."
         )
+        if len(made.components) > 1:
+            say += f" {len(made.components)} maps are left; the picture shows the first, the numbers are of all."
         told = (("calls of INTEGRATE", str(len(made.calls)), ""), ("segments", str(rows), ""))
         return Step("ABC"[k], say, tuple(shapes), (*told, metres("doubled walls", length, 2)))
 
     return Stage(
         id="comparison",
         title="The three methods compared",
-        about="The same scans, the same integrations of neighbours: what differs is what is fused with what, and how"
-        " often.",
+        about="The same scans by each method: what differs is what is integrated and fused with what, and how often.",
         algorithm="methods",
         count=len(names),
         step=step,
         marks=tuple(Mark(k, name) for k, name in enumerate(names)),
         box=around(*(part.map.coordinates for made in merges.values() for part in made.components[:1])),
         chart=chart,
-        figure="Figs. 7, 12 and 13",
+        figure="Figs. 7 and 11 to 13",
     )
