@@ -42,6 +42,8 @@ TEND_SECONDS = 2.0
 GRACE_SECONDS = 3
 KEEP_ALIVE_SECONDS = 75
 """that a connection stays open for a browser's next request"""
+TURN_SECONDS = 0.001
+"""that a thread holds the interpreter while others wait: a request lets it go and waits for its turn many times"""
 SOCKET_BYTES = 64 * 1024 * 1024
 ROUTERS = (
     pages.router,
@@ -153,6 +155,7 @@ class _Server(uvicorn.Server):
 
     def run_until_stopped(self) -> None:
         """Serve; Ctrl+C ends it."""
+        sys.setswitchinterval(TURN_SECONDS)
         with suppress(KeyboardInterrupt):
             self.run(sockets=[self._listening])
         gc.freeze()  # the interpreter's last collections would take seconds, and free what goes anyway

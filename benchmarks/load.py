@@ -260,12 +260,12 @@ async def crowd(url: str, small: list[str], given: argparse.Namespace, times: Ti
 
     works: list[Awaitable[None]] = [one(number) for number in range(given.browsers)]
     if given.pages:
-        works.append(asyncio.to_thread(pages, url, given.pages, given.seconds))
+        works.append(asyncio.to_thread(pages, url, given.pages, given.seconds, given.picture))
     await asyncio.gather(*works)
 
 
-def pages(url: str, count: int, seconds: float) -> None:
-    """Real pages on the large project, that step through its queue by the keyboard."""
+def pages(url: str, count: int, seconds: float, picture: Path | None) -> None:
+    """Real pages on the large project, that step through its queue by the keyboard: how long until the next pair."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -278,11 +278,25 @@ def pages(url: str, count: int, seconds: float) -> None:
         for page in shown:
             page.locator(".item").first.wait_for()
         print(f"{count} real pages show their queue after {time.monotonic() - start:.1f} s", flush=True)
+        steps = []
         while time.monotonic() < start + seconds:
             for page in shown:
-                page.keyboard.press("j")
+                steps.append(_step(page))
                 page.wait_for_timeout(500)
+        print(
+            f"a step takes {1000 * _quantile(steps, 0.5):.0f} ms, 95 % {1000 * _quantile(steps, 0.95):.0f}", flush=True
+        )
+        if picture is not None:
+            shown[0].screenshot(path=picture)
         browser.close()
+
+
+def _step(page: Any) -> float:
+    """Seconds from a key to the next pair in the address."""
+    before, start = page.url, time.monotonic()
+    page.keyboard.press("j")
+    page.wait_for_function("(before) => location.href !== before", arg=before)
+    return time.monotonic() - start
 
 
 def measured(workspace: Path, given: argparse.Namespace) -> bool:
@@ -326,6 +340,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=60.0, help="that each browser works")
     parser.add_argument("--think", type=float, default=2.0, help="seconds between two things a person does, on average")
     parser.add_argument("--pages", type=int, default=0, help="real chromium pages beside them")
+    parser.add_argument("--picture", type=Path, help="what one of them shows in the end, as a PNG")
     parser.add_argument("--workspace", type=Path, help="keep the projects there; used again where it exists")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
