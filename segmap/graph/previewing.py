@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from segmap.graph.edges import Edge
-from segmap.graph.optimised import HALF, Optimised, Residual
+from segmap.graph.optimised import HALF, Optimised, Part, Residual
 from segmap.graph.optimising import GATE, optimise
 from segmap.graph.ways import Loop, loop_of
 from segmap.graph.words import described_loop, in_words
@@ -77,7 +77,8 @@ def preview(
     """
     solve = partial(optimise, gate=gate, most=most, check=check)
     before = solve(edges, known=before)
-    initial = before.poses if _together(candidate, before) else None
+    within = _together(candidate, before)
+    initial = within.poses if within else None
 
     def with_it(*, trusted: bool) -> Optimised:
         return solve([*edges, replace(candidate, trusted=trusted)], initial, known=before)
@@ -95,14 +96,15 @@ def preview(
         silenced=weight < HALF,
         shifts=tuple(_shifts(before, after)),
         contradicts=tuple(sorted(contradicts, key=lambda residual: -residual.chi)),
-        loop=loop_of(candidate, before.ways()),
+        loop=loop_of(candidate, within.ways) if within else None,
         after=after,
     )
 
 
-def _together(candidate: Edge, before: Optimised) -> bool:
-    first, second = before.component_of(candidate.first), before.component_of(candidate.second)
-    return first is not None and first == second
+def _together(candidate: Edge, before: Optimised) -> Part | None:
+    """The component that holds both scans; None where the candidate joins what was apart."""
+    part = before.part_of(candidate.first)
+    return part if part is not None and candidate.second in part.poses else None
 
 
 def _agreed(after: Optimised) -> bool:
@@ -118,7 +120,7 @@ def _agreed(after: Optimised) -> bool:
 
 def _expected(candidate: Edge, before: Optimised, weight: float) -> Residual | None:
     """How far the candidate is from where the graph has its second scan, and how sure both are of that."""
-    if not _together(candidate, before):
+    if _together(candidate, before) is None:
         return None
     T_1_2 = before.poses[candidate.first].inverse() @ before.poses[candidate.second]
     left = np.array(tuple(candidate.T_1_2)) - tuple(T_1_2)
@@ -130,9 +132,11 @@ def _expected(candidate: Edge, before: Optimised, weight: float) -> Residual | N
 
 def _shifts(before: Optimised, after: Optimised) -> list[Shift]:
     shifts = []
-    for part in before.components:
-        back = after.poses[part[0]].inverse()
-        for scan in part:
+    for part in before.parts:
+        if after.part_of(part.scans[0]) is part:
+            continue
+        back = after.poses[part.scans[0]].inverse()
+        for scan in part.scans:
             moved = (back @ after.poses[scan]).distance(before.poses[scan])
             shifts.append(Shift(scan, *moved))
     moving = [shift for shift in shifts if shift.translation >= STILL or shift.rotation >= STILL]
