@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Annotated, Any
 
 import typer
 
+from app.cli.compiling import compiling
 from app.cli.explaining import explanation_json, print_explanation
 from app.cli.options import (
     DEFAULT_MODE,
@@ -52,7 +53,9 @@ def integrate(
     name, map_of = segment_maps(log, method.parameters)
     map_1, map_2 = map_of(first), map_of(second)
     expected = prior_of(prior, prior_std)
-    match = match_maps(map_1, map_2, method.parameters, method.heuristic, method.mode, prior=expected)
+    with compiling() as compiled:
+        match = match_maps(map_1, map_2, method.parameters, method.heuristic, method.mode, prior=expected)
+    match = replace(match, milliseconds=max(0.0, match.milliseconds - compiled.milliseconds))
     explanation = None
     if explained and match.T_1_2 is not None:
         explanation = explain(map_1, map_2, match.T_1_2, method.parameters, sights=method.mode != "paper")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -14,7 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from segmap.pose import Pose2
 
-__all__ = ["pose_json", "print_facts", "print_json", "print_table", "progress", "show_pose"]
+__all__ = ["pose_json", "print_facts", "print_json", "print_table", "progress", "remark", "show_pose"]
 
 
 def print_json(document: Mapping[str, Any]) -> None:
@@ -52,6 +53,12 @@ def show_pose(pose: Pose2 | None) -> str:
 def pose_json(pose: Pose2 | None) -> dict[str, float] | None:
     """A pose for programs."""
     return None if pose is None else {"x": pose.x, "y": pose.y, "theta": pose.theta}
+
+
+def remark(said: str) -> None:
+    """Say something on standard error, where a person sits there."""
+    if sys.stderr.isatty():
+        typer.echo(f"segmap: {said}", err=True)
 
 
 @contextmanager

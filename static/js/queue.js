@@ -171,7 +171,7 @@ export class Queue {
     const doubtful = undecided.filter((row) => row.verdict === "review");
     const need = rows.some((row) => row.verdict === "review") ? doubtful : undecided;
     const open = undecided.length > 0 || rows.some((row) => row.state === "matching");
-    text(byId("need"), open ? `${whole(need.length)} of ${whole(rows.length)} need you` : rows.length ? "Everything is decided" : "");
+    text(byId("need"), open ? `${whole(need.length)} need${need.length === 1 ? "s" : ""} you` : rows.length ? "Everything is decided" : "");
   }
 
   #find(words) {
@@ -240,7 +240,7 @@ export class Queue {
   }
 }
 
-const RARE = new Set(["loops", "silenced", "later", "nudged"]);
+const RARE = new Set(["none", "loops", "silenced", "later", "nudged"]);
 const PROPOSALS = { accepted: "→ accept", review: "→ look", rejected: "→ reject" };
 const SHORT = { none: "none found", failed: "failed", matching: "matching" };
 

@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import Any
 
 import ezdxf
+import numba
 import numpy as np
 import pytest
 from map_server import FREE, load_map
 
 import app.server
+from app.cli.compiling import compiling
 from app.resources import program_version, samples_folder
 from segmap.benchmark import is_right
 from segmap.export import FORMATS
@@ -344,6 +346,19 @@ def test_help_flows(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     paragraphs = [lines for one in re.split(r"\n\s*\n", told) if (lines := one.strip().splitlines())]
     assert len(paragraphs) >= 2
     assert all(len(line) > 50 for lines in paragraphs for line in lines[:-1])
+
+
+def test_compiling_is_told_and_is_no_matching(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    """What is compiled the first time is said once where a person sits, and timed apart."""
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with compiling() as idle:
+        pass
+    with compiling() as busy:
+        for shift in (1, 2):
+            assert numba.njit(lambda x, shift=shift: x + shift)(1) == 1 + shift
+    assert (idle.milliseconds, idle.told) == (0.0, False)
+    assert busy.milliseconds > 1.0
+    assert capsys.readouterr().err.count("compiling for this computer") == 1
 
 
 @pytest.fixture
