@@ -44,7 +44,14 @@ function ended(error) {
 function show({ integration, names, stage, theme: wanted }) {
   const of = names ? names.join(" and ") : integration ? pair(integration) : "";
   text(byId("what"), stage === "map" ? "the merged map" : [of, stage].filter(Boolean).join(", "));
-  if (wanted !== theme) document.documentElement.style.colorScheme = theme = wanted;
+  if (wanted !== theme) dress(wanted);
+}
+
+/** As the person who is followed has it; a scene that was loaded dark stays so until it is loaded again. */
+function dress(wanted) {
+  const scene = byId("scene");
+  document.documentElement.style.colorScheme = theme = wanted;
+  if (wanted === "light" && scene.src.endsWith("?darkMode")) scene.src = scene.src.replace("?darkMode", "");
 }
 
 function cover(sentence) {

@@ -4,26 +4,32 @@ import { dark, watch } from "./appearance.js";
 import { byId, text } from "./dom.js";
 import { listen } from "./keys.js";
 
+const FORCED = "?darkMode"; // viser's page is dark from the start, and stays so whatever it is told
+
 /** Show the scene of a view, each time the view is opened; `actions` answer the keys there as they do in the page. */
 export function scene(view, actions) {
   const frame = byId("scene");
   view.addEventListener("opened", () => {
-    cover("Loading the scene…");
-    frame.src = dark() ? `${view.scene}?darkMode` : view.scene;
+    load(frame, view);
     theme(view);
   });
-  watch(() => theme(view));
+  watch(() => {
+    theme(view);
+    if (!dark() && frame.src.endsWith(FORCED)) load(frame, view);
+  });
   frame.addEventListener("load", () => loaded(frame, actions));
 }
 
-let telling = Promise.resolve();
+/** Load it in the page's colours, so that it does not flash; those of a shared view are its owner's. */
+function load(frame, view) {
+  cover("Loading the scene…");
+  frame.src = dark() && !view.shared ? view.scene + FORCED : view.scene;
+}
 
-/** The colours of the scene follow the page; one is told after the other, so that the last one counts. */
+/** The colours of the scene follow the page. */
 function theme(view) {
-  if (view.shared) return; // its colours are those of whoever shares it
-  telling = telling
-    .then(() => view.act("set_theme", dark() ? "dark" : "light"))
-    .catch((error) => view.project.tell("trouble", error));
+  if (view.id === null || view.shared) return;
+  view.act("set_theme", dark() ? "dark" : "light").catch((error) => view.project.tell("trouble", error));
 }
 
 /** Cover the scene with a sentence, or uncover it; `again` is offered as a button. */
