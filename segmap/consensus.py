@@ -20,7 +20,7 @@ from segmap.segments import SegmentMap
 from segmap.spreading import Pair
 from segmap.visibility import Sighting, look, sighting, thinned
 
-__all__ = ["LEAST_VOTES", "Consensus", "sightings", "voted"]
+__all__ = ["JOINT_GATES", "LEAST_VOTES", "RETURNS", "Consensus", "sightings", "voted"]
 
 LEAST_VOTES, LEAST_SCORE, LEAST_LEAD = 2, 6.0, 0.1
 """pairs that must agree, the metres all must score together, and the share of it they must be ahead of any rival"""

@@ -8,13 +8,14 @@ from itertools import combinations, groupby, pairwise, product
 
 import numpy as np
 
+from segmap.consensus import LEAST_VOTES
 from segmap.fusion import fuse_all
 from segmap.graph import Optimised, optimise
 from segmap.graph.edges import Parts
 from segmap.holding import FIRM, loose_parts, weakly_held
 from segmap.integration import Match
 from segmap.keyframes import chained
-from segmap.links import Link, Pace
+from segmap.links import Link, Pace, alike
 from segmap.loops import (
     AGREE,
     LEAST_AGREEMENT,
@@ -31,9 +32,10 @@ from segmap.merging import Component
 from segmap.parameters import Parameters
 from segmap.pose import Pose2
 from segmap.scans import ScanId
+from segmap.second_looks import better_places
 from segmap.segments import SegmentMap
 from segmap.spreading import Crew, Keep, Matches, Pair, Told
-from segmap.strays import beside, placed, strays
+from segmap.strays import beside, links_at, placed, strays
 
 __all__ = ["WholeMap", "fused", "map_scans"]
 
@@ -152,6 +154,7 @@ def _close_loops(task: _Task, keys: Sequence[ScanId], links: dict[Pair, Link], m
         links.update((link.pair, link) for link in holding)
         optimised = optimise([link.edge for link in links.values()], check=task.crew.check)
     _reconsider(task, optimised, links, matches)
+    _look_again(task, scene, links, matches)
 
 
 def _placed(task: _Task, scene: Scene, optimised: Optimised, matches: Matches) -> list[Link]:
@@ -174,6 +177,20 @@ def _reconsider(task: _Task, optimised: Optimised, links: dict[Pair, Link], matc
                 if link.why not in FIRM:
                     del links[link.pair]
             links.update((link.pair, link) for link in found)
+
+
+def _look_again(task: _Task, scene: Scene, links: dict[Pair, Link], matches: Matches) -> None:
+    """Hold scans that all around them see clearly better elsewhere nearby by what says so, not by what denies it."""
+    optimised = optimise([link.edge for link in links.values()], check=task.crew.check)
+    for part in optimised.components:
+        for scan, T, around in better_places(task.crew.maps, part, optimised.poses, matches, scene.parameters):
+            poses = {**optimised.poses, scan: T}
+            found = list(links_at(T, {other: poses[other] for other in around}, {scan: Pose2.identity()}, matches))
+            if len(found) >= LEAST_VOTES:
+                for link in [link for link in links.values() if scan in link.pair]:
+                    if not alike(link.T_1_2, poses[link.first].inverse() @ poses[link.second]):
+                        del links[link.pair]
+                links.update((link.pair, link) for link in found)
 
 
 def _sound(optimised: Optimised, links: Mapping[Pair, Link]) -> list[Link]:

@@ -30,7 +30,7 @@ from segmap.scans import ScanId
 from segmap.segments import SegmentMap
 from segmap.spreading import Crew, Matches, Pair
 
-__all__ = ["Stray", "beside", "placed", "strays"]
+__all__ = ["Stray", "beside", "links_at", "placed", "strays"]
 
 REACH = 6.0
 """metres, and radians times metres, from the neighbours of a stray to the scans that vote on it"""
@@ -114,7 +114,7 @@ def placed(
     T_home_stray = found.T_1_2 if found is not None and found.clear else None
     if T_home_stray is None and len(stray.scans) == 1 and len(stray.ends) == 2 and around:
         T_home_stray = _seen_together(stray.scans[0], around, crew, allowed)
-    links = [] if T_home_stray is None else [*_links(T_home_stray, around, own, matches)]
+    links = [] if T_home_stray is None else [*links_at(T_home_stray, around, own, matches)]
     return links if len(links) >= LEAST_VOTES else []
 
 
@@ -150,7 +150,7 @@ def _seen_together(
     return around[first] @ within[0].T_1_2 if ahead else None
 
 
-def _links(
+def links_at(
     T_home_stray: Pose2, around: Mapping[ScanId, Pose2], own: Mapping[ScanId, Pose2], matches: Matches
 ) -> Iterator[Link]:
     """The links of all pairs that have a candidate there; those that close a loop by themselves bear it out."""
@@ -158,7 +158,9 @@ def _links(
         for b, T_stray_b in own.items():
             pair, T_a_b = _pair(a, b), T_home_a.inverse() @ T_home_stray @ T_stray_b
             T_1_2 = T_a_b if a < b else T_a_b.inverse()
-            match = matches[pair]
+            match = matches.get(pair)
+            if match is None:
+                continue
             closed = closure(Promise(pair, 1.0, Gate(T_1_2, 0.0)), match)
             rank = next((k for k, c in enumerate(match.ranked[:CANDIDATES]) if alike(c.T_1_2, T_1_2)), None)
             if closed is not None:

@@ -56,6 +56,7 @@ ORDER = (
     "keyframes",
     "loops",
     "strays",
+    "second_looks",
     "holding",
     "mapping",
     "revisits",
