@@ -30,14 +30,19 @@ VARIABLE = "SEGMAP_TOKEN"
 PARAMETER = "token"
 FOLLOWING = "/follow/"
 """where nothing is asked: who follows a view is known by the name in the address, and may only look"""
+STYLES = ("base", "dialogs", "figures", "menus", "project", "walk")
+SCRIPTS = ("api", "appearance", "dom", "follow", "format", "notices", "stream", "theme")
+PLAYER = ("chart", "classes", "figure", "page", "player", "races")
 FILES = frozenset(
     f"/static/{name}"
     for name in (
-        *("favicon.svg", "icons.svg", "css/base.css", "css/project.css"),
-        *(f"js/{name}.js" for name in ("theme", "follow", "api", "dom", "format", "stream")),
+        *("favicon.svg", "icons.svg"),
+        *(f"css/{name}.css" for name in STYLES),
+        *(f"js/{name}.js" for name in SCRIPTS),
+        *(f"js/walk/{name}.js" for name in PLAYER),
     )
 )
-"""what the page of who follows is made of"""
+"""what the pages of who follows a view, or a walkthrough, are made of"""
 SHORTEST = 16
 DAYS = 30
 MISSING = "This server asks for the link that it printed when it was started: open that link, or ask who started it."

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import posixpath
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -36,6 +38,24 @@ def test_without_the_token_there_is_nothing(client: Any) -> None:
     assert page.status_code == 401
     assert "link" in page.text
     assert "unsafe" not in page.headers["content-security-policy"]
+
+
+@pytest.mark.parametrize("page", ["/follow/x", "/follow/walk/x"])
+def test_who_follows_gets_all_that_the_page_is_made_of(client: Any, page: str) -> None:
+    """Styles, scripts and whatever these import, without the token: a class on other computers has none."""
+    waiting, seen = [page], set[str]()
+    while waiting:
+        path = waiting.pop()
+        answer = client.get(path, headers=HOST)
+        assert answer.status_code == 200 or path == page == "/follow/x", path  # nobody shares that view
+        seen.add(path)
+        named = re.findall(r'(?:src|href)="(/static/[^"#]+)', answer.text) if path == page else []
+        if path.endswith(".js"):
+            named = [
+                posixpath.join(posixpath.dirname(path), name) for name in re.findall(r'from "(\.[^"]+)"', answer.text)
+            ]
+        waiting += {posixpath.normpath(name) for name in named} - seen
+    assert len(seen) > 8
 
 
 @pytest.mark.parametrize("brought", ["wrong", "", "é", "x" * 32, "%00"])
