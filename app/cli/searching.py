@@ -57,6 +57,8 @@ def loops(
         if keep and new:
             store.append(Propose(proposals=new, who=SEARCH))
         _report(store, found, len(new), as_json)
+    if keep and found.closures and not as_json:
+        typer.echo(f"None is in the map before a person accepts it: segmap serve {project}")
 
 
 def _report(store: Store, found: Found, new: int, as_json: bool) -> None:
@@ -67,7 +69,7 @@ def _report(store: Store, found: Found, new: int, as_json: bool) -> None:
         print_json({"closures": rows, "new": new, **counts, "revision": store.state.revision})
         return
     if rows:
-        header = ("pair", "value [m]", "confidence", "residual", "verdict")
+        header = ("pair", "value [m]", "confidence", "residual", "judged")
         print_table(header, [_line(row) for row in rows])
     typer.echo(found.in_words(new))
 

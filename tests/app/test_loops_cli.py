@@ -62,9 +62,10 @@ def test_loops_are_found_told_and_kept(project: Path, capsys: pytest.CaptureFixt
         assert not store.state.decisions
     status, out, _ = run(capsys, "loops", project, "--workers", 1)
     assert status == 0
-    assert out.splitlines()[0].split() == ["pair", "value", "[m]", "confidence", "residual", "verdict"]
-    assert len(out.splitlines()) == len(told["closures"]) + 2
-    assert "0 are new in the queue." in out.splitlines()[-1]
+    assert out.splitlines()[0].split() == ["pair", "value", "[m]", "confidence", "residual", "judged"]
+    assert len(out.splitlines()) == len(told["closures"]) + 3
+    assert "0 are new in the queue." in out.splitlines()[-2]
+    assert out.splitlines()[-1] == f"None is in the map before a person accepts it: segmap serve {project}"
 
 
 @pytest.mark.slow

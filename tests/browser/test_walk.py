@@ -142,6 +142,16 @@ def test_a_real_pair(desk: Any, server: Any, datasets: Path) -> None:
     assert walk.drawn == first
 
 
+def test_a_low_window_shows_what_a_step_changes(new_desk: Any, server: Any) -> None:
+    """Words and the tree of integrations are in sight without scrolling; what the method is stands below them."""
+    walk = Walk(new_desk(1280, 720))
+    walk.open(f"{server.url}/walk?sample=laboratory&merge=0.0-0.3&mode=verified&stage=pivot&step=2")
+    told, tree = walk.page.locator(".walk-told"), walk.page.locator(".walk-told svg.chart")
+    tree.wait_for()
+    shown, drawn = told.bounding_box(), tree.bounding_box()
+    assert drawn["y"] + drawn["height"] <= shown["y"] + shown["height"] + 1.0
+
+
 def test_a_class_follows_its_teacher(new_desk: Any, server: Any) -> None:
     """Who opens the link sees each step of the teacher's, and has nothing to press."""
     teacher, pupil = Walk(new_desk()), Walk(new_desk())
