@@ -12,6 +12,7 @@ export function mapTools(project, view) {
   byId("map-compare").addEventListener("change", act("set_compare"));
   byId("map-side").addEventListener("change", act("set_side"));
   byId("map-measure").addEventListener("click", () => view.act("toggle_measuring").catch(failed));
+  byId("map-show").addEventListener("click", () => view.act("set_stage", "map").catch(failed));
   const others = () => offer(project, view).catch(failed);
   for (const kind of ["pointerenter", "focus"]) byId("map-compare").addEventListener(kind, others);
   view.addEventListener("changed", () => show(view));
@@ -24,8 +25,9 @@ async function offer(project, view) {
 }
 
 function show({ snapshot }) {
-  const { map, measuring, measured, picked } = snapshot;
+  const { map, measuring, measured, picked, stage } = snapshot;
   if (!map) return;
+  byId("map-show").hidden = stage === "map";
   choices(byId("map-colouring"), map.colourings, map.colouring);
   const others = [...byId("map-compare").options].map(({ value, label }) => ({ name: value, title: label }));
   if (map.other && !others.some(({ name }) => name === map.other.name)) others.push(map.other);

@@ -94,6 +94,9 @@ def test_the_map(new_desk: Callable[..., Any], server: Any, request: pytest.Fixt
     page = desk.page
     page.locator("#tab-map").click()
     desk.until(lambda: map_settled(server, project), "the map")
+    page.locator("#map-show").click()
+    desk.until(lambda: snapshot(desk, server)["stage"] == "map", "the stage")
+    page.locator("#map-show").wait_for(state="hidden")
     page.locator("#map-colouring").select_option("misfit")
     desk.until(lambda: any(node.startswith("/map/component") for node in desk.nodes), "the map in the scene")
     desk.scene.get_by_text("95 % within").wait_for()
