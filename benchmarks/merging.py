@@ -99,7 +99,7 @@ def timed(work: Callable[[], Merge]) -> tuple[Merge, float]:
 
 
 def methods(stretches: Iterable[Stretch]) -> Iterator[str]:
-    """A table for each mode: calls, seconds, segments, doubles, components, and neighbours placed wrong."""
+    """A table for each mode and stretch: calls, seconds, segments, doubles, components, and neighbours placed wrong."""
     header = [
         "Scans",
         "Method",
@@ -108,8 +108,8 @@ def methods(stretches: Iterable[Stretch]) -> Iterator[str]:
     ]
     stretches = list(stretches)
     for mode, heuristic in MODES:
-        rows = [row for stretch in stretches for row in _rows(stretch, mode, heuristic)]
-        yield f"**{mode} mode**\n\n{markdown(header, rows)}"
+        for stretch in stretches:
+            yield f"**{mode} mode**\n\n{markdown(header, list(_rows(stretch, mode, heuristic)))}"
 
 
 def _rows(stretch: Stretch, mode: str, heuristic: str | None) -> Iterator[list[object]]:
@@ -228,27 +228,28 @@ def robots(logs: Mapping[str, LaserLog]) -> Iterator[str]:
 
 
 def _local_maps(name: str, log: LaserLog) -> tuple[Stretch, list[Component]] | None:
-    """The first stretch of a log whose four local maps each hold together, and those maps."""
-    parameters = preset("verified")
-    step = LOCAL - SHARED_SCANS
-    count = ROBOTS * step + SHARED_SCANS
-    for start in range(0, len(log), step * LOGS[name][1]):
-        stretch = Stretch(name, log, start, LOGS[name][1], count)
-        ids = stretch.ids
-        if len(ids) < count:
-            return None
-        maps = stretch.maps(parameters)
-        parts = []
-        for robot in range(ROBOTS):
-            own = {scan: maps[scan] for scan in ids[robot * step : robot * step + LOCAL]}
-            between = replace(stretch, start=min(own).scan, count=LOCAL).between(parameters)
-            components = merge(own, parameters, None, "verified", between=between).components
-            if len(components) > 1 or _wrong(components[0], stretch):
-                break
-            parts += components
-        if len(parts) == ROBOTS:
-            return stretch, parts
+    """The first stretch of a log whose four local maps each hold together, and those maps.
+
+    Scans as far apart as elsewhere if there is such a stretch; else, as in cluttered rooms, closer together.
+    """
+    for stride in range(LOGS[name][1], 0, -1):
+        step = (LOCAL - SHARED_SCANS) * stride
+        parts: list[Component] = []
+        for start in range(0, len(log) - (LOCAL - 1) * stride, step):
+            part = _local_map(Stretch(name, log, start, stride, LOCAL))
+            parts = [*parts, part] if part else []
+            if len(parts) == ROBOTS:
+                count = ROBOTS * (LOCAL - SHARED_SCANS) + SHARED_SCANS
+                return Stretch(name, log, start - (ROBOTS - 1) * step, stride, count), parts
     return None
+
+
+def _local_map(stretch: Stretch) -> Component | None:
+    """The map of a stretch if it holds together and every scan of it is right beside the one before."""
+    parameters = preset("verified")
+    between = stretch.between(parameters)
+    components = merge(stretch.maps(parameters), parameters, None, "verified", between=between).components
+    return None if len(components) > 1 or _wrong(components[0], stretch) else components[0]
 
 
 def _pair(stretch: Stretch, parts: Sequence[Component], i: int, j: int) -> list[object]:
