@@ -5,7 +5,7 @@
     {"first_angle_deg": -90, "angle_step_deg": 1, "scans": [{"time": 0.0, "ranges": [2.51, null]}]}
 
 What stands beside ``scans`` holds for every scan that does not say otherwise. A pose may be written
-``"pose": [x, y, theta]``. A document is read at once, so that its size is bounded; JSON lines are not.
+``"pose": [x, y, theta]``. A large document is read scan by scan; what holds for all scans then stands before them.
 """
 
 from __future__ import annotations
@@ -19,16 +19,19 @@ from typing import Any
 import numpy as np
 
 from segmap.errors import LogError
+from segmap.logs.json_stream import JsonStream, malformed
 from segmap.logs.measured import NAMES, SENSOR, scan_of
 from segmap.logs.records import Format, Problems, Record, too_many
 from segmap.logs.source import LogFile
-from segmap.logs.text import MalformedError, printable
+from segmap.logs.text import MalformedError
 from segmap.pose import FloatArray
 
 __all__ = ["DOCUMENT", "RANGES_JSON", "RANGES_JSON_LINES", "document", "parsed"]
 
 DOCUMENT = 1 << 24
 """bytes of the largest document read at once"""
+VALUE = 1 << 24
+"""characters of the largest value in a larger one"""
 RANGES = re.compile(rb'"ranges"\s*:')
 
 
@@ -40,12 +43,8 @@ def parsed(text: bytes) -> Any:
     """
     try:
         return json.loads(text)
-    except json.JSONDecodeError as error:
-        raise MalformedError(f"it is no valid JSON: {error.msg.lower()}, line {error.lineno}, {error.colno}") from None
-    except UnicodeDecodeError:
-        raise MalformedError("it is no valid JSON: it is not written in UTF-8") from None
-    except (RecursionError, ValueError) as error:
-        raise MalformedError(f"it is no JSON that can be read: {printable(str(error)).lower()}") from None
+    except (ValueError, RecursionError) as error:
+        raise malformed(error) from None
 
 
 def document(file: LogFile, remedy: str, most: int = DOCUMENT) -> Any:
@@ -57,21 +56,72 @@ def document(file: LogFile, remedy: str, most: int = DOCUMENT) -> Any:
     content = file.read(most + 1)
     if len(content) > most:
         raise LogError(f"{file.name} is a JSON document of more than {most >> 20} MiB: {remedy}.")
+    return _whole(file, content)
+
+
+def _whole(file: LogFile, content: bytes) -> Any:
     try:
         return parsed(content.removeprefix(b"\xef\xbb\xbf"))
     except MalformedError as error:
-        cut = f"; the file is {file.damage}" if file.damage else ""
-        raise LogError(f"{file.name} cannot be read: {error}{cut}. Write it again.") from None
+        raise _refused(file, error) from None
+
+
+def _refused(file: LogFile, error: MalformedError) -> LogError:
+    cut = f"; the file is {file.damage}" if file.damage else ""
+    return LogError(f"{file.name} cannot be read: {error}{cut}. Write it again.")
 
 
 def _document_records(file: LogFile, problems: Problems) -> Iterator[Record]:
-    held = document(file, "write a scan a line instead, as JSON lines")
+    content = file.read(DOCUMENT + 1)
+    scans = _streamed(file, content) if len(content) > DOCUMENT else _scans(file, _whole(file, content))
+    for number, (common, scan) in enumerate(scans, start=1):
+        yield from _taken(scan, common, number, problems)
+
+
+def _scans(file: LogFile, held: Any) -> Iterator[tuple[Mapping[str, Any], Any]]:
+    """What holds for all scans, and each scan."""
     common = {name: value for name, value in held.items() if name != "scans"} if isinstance(held, dict) else {}
     scans = held.get("scans", [held] if "ranges" in held else []) if isinstance(held, dict) else held
     if not isinstance(scans, list):
-        raise LogError(f'{file.name} has no list of scans: write them as "scans": [...].')
-    for number, scan in enumerate(scans, start=1):
-        yield from _taken(scan, common, number, problems)
+        raise _no_list(file)
+    return ((common, scan) for scan in scans)
+
+
+def _streamed(file: LogFile, start: bytes) -> Iterator[tuple[Mapping[str, Any], Any]]:
+    """The same of a document that begins with ``start``, whose scans are not all held at once."""
+    try:
+        stream = JsonStream(file, start, VALUE)
+        if stream.next() == "[":
+            yield from (({}, scan) for scan in stream.elements())
+        else:
+            yield from _members(file, stream)
+        stream.end()
+    except MalformedError as error:
+        raise _refused(file, error) from None
+
+
+def _members(file: LogFile, stream: JsonStream) -> Iterator[tuple[Mapping[str, Any], Any]]:
+    common: dict[str, Any] = {}
+    begun = False
+    for name in stream.members():
+        stream.member()
+        if name == "scans":
+            if begun:
+                raise LogError(f"{file.name} has two lists of scans: write one.")
+            if stream.next() != "[":
+                raise _no_list(file)
+            begun = True
+            yield from ((common, scan) for scan in stream.elements())
+        else:
+            common[name] = stream.value()
+            if begun and name in (*NAMES, SENSOR, "pose", "ranges"):
+                raise LogError(f"{file.name} says {name} after its scans: in a large document write it before them.")
+    if not begun and "ranges" in common:
+        yield {}, common
+
+
+def _no_list(file: LogFile) -> LogError:
+    return LogError(f'{file.name} has no list of scans: write them as "scans": [...].')
 
 
 def _line_records(file: LogFile, problems: Problems) -> Iterator[Record]:

@@ -11,13 +11,14 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 from bags import ECHOES, ROS_1, ROS_2, SCAN, laser_scan, multi_echo, ranges, texts, write_ros1, write_ros2
 
 from segmap.errors import SegmapError
 from segmap.events import Choice, Decide, Proposal, Propose, Rename, Undo, event_from_json
 from segmap.export import export_map
-from segmap.logs import Limits, read_logs, read_maps, read_pose_graph
+from segmap.logs import Limits, ranges_json, read_logs, read_maps, read_pose_graph
 from segmap.logs.tables import read_relations, read_trajectory
 from segmap.merging import Component
 from segmap.pose import Pose2
@@ -79,6 +80,12 @@ def logs() -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as folder:
         held = {**_texts(), **_bags(Path(folder))}
     return {**held, "gzip": gzip.compress(held["CARMEN"])}
+
+
+def read_large(content: bytes, **how: Any) -> object:
+    """Read a JSON document as one that is too large to be read at once."""
+    with patch.object(ranges_json, "DOCUMENT", 1):
+        return read_logs(content, **how)
 
 
 def maps() -> dict[str, bytes]:
@@ -147,6 +154,7 @@ def readers() -> Mapping[str, tuple[Read, bytes]]:
     """Every reader, with a good file of its kind."""
     kinds: tuple[tuple[Any, dict[str, bytes]], ...] = (
         (read_logs, logs()),
+        (read_large, {"JSON, large": _texts()["JSON"]}),
         (read_maps, maps()),
         (read_pose_graph, graphs()),
         (read_relations, relations()),

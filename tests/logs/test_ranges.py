@@ -7,9 +7,11 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from segmap.errors import LogError
-from segmap.logs import read_log
+from segmap.logs import json_stream, ranges_json, read_log
 from segmap.pose import Pose2
 
 RANGES = [2.5, 2.25, 1.0, 3.0]
@@ -148,7 +150,7 @@ def test_bad_scans(scan, reason):
         (b'{"ranges": "\xff"}', "not written in UTF-8"),
         (b'{"ranges": ' + b"[" * 100_000, "it is no JSON that can be read"),
         (b'{"scans": 7, "ranges": []}', "has no list of scans"),
-        (b'{"ranges": [' + b"1," * (1 << 23) + b"1]}", "more than 16 MiB: write a scan a line"),
+        (b'{"ranges": [' + b"1," * (1 << 24) + b"1]}", "it holds one value of more than 16 MiB"),
     ],
 )
 def test_bad_documents(content, reason):
@@ -157,3 +159,60 @@ def test_bad_documents(content, reason):
         read_log(content, "run.json")
     assert reason in str(refused.value)
     assert str(refused.value).isprintable()
+
+
+SCANS = st.lists(
+    st.builds(
+        lambda values, more: {"ranges": values, **more},
+        st.lists(st.one_of(st.none(), st.floats(), st.integers(-3, 300)), max_size=6),
+        st.sampled_from([{}, {"time": 2.5}, {"sensor": 'b"\\é\U0001f916'}, {"pose": [1, 2, 0.5]}, {"x": "no"}]),
+    ),
+    max_size=5,
+)
+COMMON = st.sampled_from(
+    [{}, {"first_angle_deg": -90, "angle_step_deg": 2}, {"remark": {"é": [1, {}]}, "max_range": 8}]
+)
+
+
+@given(SCANS, COMMON, st.sampled_from([None, 1]), st.booleans(), st.integers(0, 400), st.sampled_from([1, 7, 4096]))
+def test_a_large_document_is_read_as_a_small_one(scans, common, indent, escaped, cut, piece):
+    """Scan by scan or at once, whole or cut off anywhere: the same scans and problems, or both are refused."""
+    held = json.dumps({**common, "scans": scans}, indent=indent, ensure_ascii=escaped).encode()
+    content = held[: len(held) - cut if cut < len(held) else None]
+    with pytest.MonkeyPatch.context() as patch:
+        at_once = _told(content)
+        patch.setattr(ranges_json, "DOCUMENT", 1)
+        patch.setattr(json_stream, "PIECE", piece)
+        assert _told(content) == at_once
+
+
+def _told(content):
+    try:
+        log = read_log(content, "run.json")
+    except LogError as error:
+        return str(error).replace("',' or '}'", "',' delimiter").replace("',' or ']'", "',' delimiter")
+    return [(str(scan.ranges), scan.time, scan.logged_pose) for scan in log], log.problems
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (
+            b'{"scans": [{"ranges": []}], "max_range": 8}',
+            "says max_range after its scans: in a large",
+        ),
+        (b'{"scans": [], "scans": [{"ranges": []}]}', "has two lists of scans"),
+        (b'{"ranges": [],\n"scans": 7}', "has no list of scans"),
+        (b'{\n"ranges": []}\n ]', "extra data, line 3, 2"),
+        (b'{"ranges": [],\n7: 8}', "expecting property name enclosed in double quotes, line 2, 1"),
+        (b'[{"ranges": []}\n{}]', "expecting ',' or ']', line 2, 1"),
+        (b'[{"ranges": "\xff"}]', "not written in UTF-8"),
+        (b'{"ranges": ' + b"[" * 100_000, "it is no JSON that can be read"),
+    ],
+)
+def test_bad_large_documents(monkeypatch, content, reason):
+    """What is wrong in a large document, and in which line."""
+    monkeypatch.setattr(ranges_json, "DOCUMENT", 1)
+    with pytest.raises(LogError, match=r"^run\.json ") as refused:
+        read_log(content, "run.json")
+    assert reason in str(refused.value)
