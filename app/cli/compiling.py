@@ -12,17 +12,19 @@ from app.cli.output import remark
 __all__ = ["Compiling", "compiling"]
 
 
-class Compiling(TimingListener):  # type: ignore[misc]
+class Compiling(TimingListener):
     """Hears of every kernel that is compiled, and says so when the first one is."""
 
-    told = False
+    def __init__(self) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]
+        self.told = False
 
     def on_start(self, event: Event) -> None:
         """A kernel is not in the cache on disk."""
         if not self.told:
             self.told = True
             remark("compiling for this computer; only the first time, some ten seconds…")
-        super().on_start(event)
+        super().on_start(event)  # type: ignore[no-untyped-call]
 
     @property
     def milliseconds(self) -> float:

@@ -38,9 +38,9 @@ def check_places(out: Sequence[Path], *others: Path | None) -> None:
     """
     for path in out:
         by_suffix(path)
-    for path in (*out, *others):
-        if path is not None:
-            check_place(path)
+    for place in (*out, *others):
+        if place is not None:
+            check_place(place)
 
 
 def described(title: str, hash: str) -> dict[str, str]:
