@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import multiprocessing
-import resource
+import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -172,8 +172,13 @@ def _cost(logs: Sequence[Path], size: int) -> tuple[int, float, float, int, int]
     maps = {ScanId(number, i): extract(scan, parameters, number, i) for number, i, scan in scans}
     whole = map_scans(maps, parameters)
     seconds = time.process_time() - started
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    return len(maps), seconds, memory, len(whole.keys), len(whole.matches)
+    return len(maps), seconds, _most_memory(), len(whole.keys), len(whole.matches)
+
+
+def _most_memory() -> float:
+    """MB this process had at the most; what getrusage tells may be its parent's."""
+    held = re.search(r"VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text())
+    return int(held[1]) / 1024.0 if held else math.nan
 
 
 # --- all of it ------------------------------------------------------------------------------------
