@@ -40,7 +40,7 @@ def server(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[SimpleNa
             pass
 
     web = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    threading.Thread(target=web.serve_forever, daemon=True).start()
+    threading.Thread(target=web.serve_forever, args=(0.01,), daemon=True).start()
     monkeypatch.setattr(datasets, "HOST", f"http://127.0.0.1:{web.server_port}")
     monkeypatch.setenv("SEGMAP_CACHE", str(held.cache))
     monkeypatch.setenv("no_proxy", "*")

@@ -27,9 +27,15 @@ VERSION_1 = Path(__file__).parent / "projects" / "version-1.segmap"
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path: Path, made: Path) -> Path:
     """A closed project with a log, decisions and results."""
-    path = tmp_path / "hall.segmap"
+    return Path(shutil.copy(made, tmp_path))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The one that is copied."""
+    path = tmp_path_factory.mktemp("made") / "hall.segmap"
     with Store.create(path, "Hall") as store:
         store.add_log("hall.log", random.Random(0).randbytes(30_000), scans=100)
         for i in range(99):

@@ -138,6 +138,7 @@ def test_interruption_is_no_traceback(run: Run, monkeypatch: pytest.MonkeyPatch)
     assert run("serve")[0] == 130
 
 
+@pytest.mark.slow
 def test_a_reader_that_leaves_early_is_no_error() -> None:
     """``segmap segments ... | head`` ends quietly."""
     command = [sys.executable, "-c", "from app.cli import main; main()", "segments", OFFICE, "--scan", "0"]

@@ -103,6 +103,7 @@ def served(*arguments: object, code: str, **environment: str) -> Iterator[tuple[
             process.kill()
 
 
+@pytest.mark.slow
 def test_a_system_that_lets_no_file_grow(tmp_path: Path) -> None:
     """Where the system really refuses to write, uploads are refused with a sentence and the server goes on."""
     log = (samples_folder() / "laboratory.log").read_bytes()
@@ -207,6 +208,7 @@ def test_a_file_that_cannot_be_opened(client: Any, project: str, change: str, wo
 SERVE = "import sys; from pathlib import Path; from app.server import serve; serve(workspace=Path(sys.argv[1]), port=0)"
 
 
+@pytest.mark.slow
 def test_a_client_that_goes_in_the_middle_of_an_upload(tmp_path: Path, log_bytes: bytes) -> None:
     """Nothing of it is kept, no temporary file stays, and the next one is served."""
     temporary = tmp_path / "temporary"

@@ -30,6 +30,7 @@ def test_integrate_takes_maps_in_place_of_scans(run: Callable[..., tuple[int, st
     assert "holds maps 0 to 1" in run("integrate", tmp_path / "maps.json", 0, 2)[2]
 
 
+@pytest.mark.slow
 def test_the_exported_map_of_a_project_comes_back_with_its_hash(
     run: Callable[..., tuple[int, str, str]], tmp_path: Path
 ) -> None:

@@ -6,6 +6,8 @@ import re
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
 
 
@@ -20,6 +22,7 @@ def named(name: str, text: str) -> dict[str, Any]:
     return {"name": name, "mimeType": "text/plain", "buffer": text.encode()}
 
 
+@pytest.mark.quick
 def test_first_visit(desk: Any, server: Any) -> None:
     """An empty workbench says how to start, and shows the samples with their pictures; one click opens one."""
     empty = '{"projects": []}'

@@ -21,7 +21,6 @@ def candidates(server: Any, project: str, integration: str) -> list[Any]:
     return list(server.get(f"/api{project}/integrations/{integration}")["match"]["ranked"])
 
 
-@pytest.mark.quick
 def test_a_sample_becomes_a_map(new_desk: Callable[..., Any], server: Any) -> None:
     """Step candidates and heuristics, accept, reject, undo, export; stop, start again: every decision is there."""
     desk = new_desk(1440, 900)

@@ -137,6 +137,7 @@ def test_empty(tmp_path):
     assert written(tmp_path).cells.tolist() == [[UNKNOWN]]
 
 
+@pytest.mark.slow
 def test_resolution(corner, tmp_path):
     """The resolution is what was asked for; too fine or impossible ones are refused with one that works."""
     assert written(tmp_path, corner, resolution=0.2).resolution == 0.2

@@ -239,6 +239,7 @@ def test_the_same_every_time():
     assert [step.error for step in one.history] == [step.error for step in other.history]
 
 
+@pytest.mark.slow
 @given(st.randoms(use_true_random=False))
 @settings(max_examples=10)
 def test_names_of_scans_and_order_of_edges_do_not_matter(chance):

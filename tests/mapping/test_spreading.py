@@ -43,6 +43,7 @@ def test_two_processes_find_what_one_finds(maps, pairs):
         assert match.ranked == match_maps(maps[a], maps[b], PARAMETERS, mode="verified").ranked
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_it_can_be_stopped(maps, pairs, workers):
     """What was given out before is done; no process goes on with the rest."""
