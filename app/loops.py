@@ -61,15 +61,17 @@ class Loops:
         """Whether the pose graph is being optimised again."""
         return self._graph.busy
 
-    def preview(self, integration: str, heuristic: str | None = None, rank: int = 0) -> Preview:
-        """What accepting a candidate would do to the graph.
+    def preview(self, integration: str, heuristic: str | None = None, rank: int = 0) -> Preview | None:
+        """What accepting a candidate would do to the graph; None where the pair has no candidates, or none yet.
 
         Raises:
-            ProjectError: there is no such candidate (yet).
+            ProjectError: there are others, but not this one.
         """
         match = self._session.match(integration, heuristic)
-        if match is None or rank >= len(match.ranked):
-            raise ProjectError(f"{integration} has no candidate of rank {rank} yet: there is nothing to preview.")
+        if match is None or not match.ranked:
+            return None
+        if rank >= len(match.ranked):
+            raise ProjectError(f"{integration} has no candidate of rank {rank}: it has {len(match.ranked)}, from 0.")
         candidate, claim = match.ranked[rank], self._session.state.proposals.get(integration)
         return self.graph.preview(edge(integration, candidate.T_1_2, covariance_at(candidate, claim)))
 

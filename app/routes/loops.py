@@ -69,10 +69,11 @@ def preview(
     integration: str,
     heuristic: Annotated[str | None, Query(max_length=255)] = None,
     candidate: Annotated[int, Query(ge=0, le=2**31)] = 0,
-) -> PreviewBody:
-    """What accepting a candidate would do to the pose graph."""
+) -> PreviewBody | None:
+    """What accepting a candidate would do to the pose graph; null while the pair has no candidates."""
     session.get_ready()
-    return _body(integration, session.loops.preview(integration, heuristic, candidate))
+    found = session.loops.preview(integration, heuristic, candidate)
+    return None if found is None else _body(integration, found)
 
 
 def _body(integration: str, found: Preview) -> PreviewBody:

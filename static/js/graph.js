@@ -45,7 +45,9 @@ export class GraphWords {
     this.#loading = new AbortController();
     try {
       const preview = await this.project.preview(url, this.#loading.signal);
-      if (url === this.#wanted) this.#draw(preview.sentences, preview.silenced || preview.contradicts.length > 0);
+      if (url !== this.#wanted) return;
+      if (preview) this.#draw(preview.sentences, preview.silenced || preview.contradicts.length > 0);
+      else this.#draw([]);
     } catch (error) {
       if (error.name !== "AbortError" && url === this.#wanted) this.#draw([]);
     }

@@ -457,6 +457,8 @@ def test_pairs_and_previews_over_http(client: Any, project: str) -> None:
     assert told["loop_error"] < 0.3
     assert any("closes a loop" in sentence for sentence in told["sentences"])
     assert client.get(f"{url}/integrations/{FAR}/preview?candidate=9999").status_code == 400
+    unmatched = client.get(f"{url}/integrations/{FAR}/preview?heuristic=histogram")
+    assert (unmatched.status_code, unmatched.json()) == (200, None)
     graph = client.get(url).json()["graph"]
     assert (graph["edges"], len(graph["strengths"]), graph["silenced"]) == (6, 1, [])
     for wrong_pair in ("0.0-0.99", "0.3-0.0", "x"):

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import httpx
 import pytest
+from pages import photograph
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, ConsoleMessage, Frame, Locator, Page
@@ -184,7 +185,7 @@ class Desk:
         path = self._pictures / f"{name}.png"
         if any("/scene" in frame.url for frame in self.page.frames):
             self._close_notes()
-        self.page.screenshot(path=path)
+        photograph(self.page, path)
         return path
 
     def _close_notes(self) -> None:

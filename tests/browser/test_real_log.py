@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pages import photograph
 
 
 def laser_lines(datasets: Path, first: int, last: int) -> bytes:
@@ -65,7 +66,7 @@ def test_a_real_log_from_drop_to_report(
         if one["impact"] in ("serious", "critical")
         for node in one["nodes"]
     ] == []
-    report.screenshot(path=pictures / "real-report.png", full_page=False)
+    photograph(report, pictures / "real-report.png")
     assert said == []
     context.close()
 

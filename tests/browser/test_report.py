@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from pages import photograph
+
 
 def test_report_from_the_menu(desk: Any, server: Any, chromium: Any, pictures: Path, tmp_path: Path) -> None:
     """It is saved from the export menu, opens offline without a word in the console, and nothing runs off the page."""
@@ -28,6 +30,6 @@ def test_report_from_the_menu(desk: Any, server: Any, chromium: Any, pictures: P
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         drawn = page.locator("figure svg").first.bounding_box()
         assert drawn["height"] > 100
-        page.screenshot(path=pictures / f"report-{scheme}.png")
+        photograph(page, pictures / f"report-{scheme}.png")
         assert errors == []
         context.close()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import httpx
 import pytest
+from pages import photograph
 
 from app.palette import PALETTES, hexadecimal
 
@@ -196,7 +197,7 @@ def test_2d_looks_straight_down_and_never_turns(window: Window, pictures: Path) 
     assert window.camera["turn"] == pytest.approx(start["turn"], abs=1e-6)
     window.page.keyboard.press("f")
     window.until(lambda: window.camera["distance"] == pytest.approx(start["distance"], rel=1e-3), "everything in sight")
-    window.page.screenshot(path=pictures / "scene-2d.png")
+    photograph(window.page, pictures / "scene-2d.png")
 
 
 def test_everything_is_in_sight_whatever_the_window(open_window: Callable[..., Window]) -> None:
@@ -222,7 +223,7 @@ def test_3d_shows_the_candidates_as_points(window: Window, pictures: Path) -> No
     window.until(lambda: window.shows("/first/candidates/points"), "the candidates")
     assert window.node("/first/candidates/points")["count"] == window.snapshot["candidates"]
     window.until(lambda: window.camera["left"] == 1, "the drag that turns")
-    window.page.screenshot(path=pictures / "scene-3d.png")
+    photograph(window.page, pictures / "scene-3d.png")
     window.press("2D")
     window.until(lambda: window.camera["fov"] < 5.0, "the camera of 2D")
     window.until(lambda: not window.shows("/first/candidates/points"), "the candidates to go")
@@ -241,7 +242,7 @@ def test_a_click_tells_what_a_segment_adds(window: Window, pictures: Path) -> No
     window.until(lambda: window.shows("/first/picked"), "the mark")
     assert window.node("/first/picked")["colour"] == hexadecimal(PALETTES["light"].accent)
     window.says("m long, heading")
-    window.page.screenshot(path=pictures / "scene-picked.png")
+    photograph(window.page, pictures / "scene-picked.png")
     window.focus()
     window.until(lambda: window.snapshot["picked"] is None, "the mark to go")
 
@@ -300,4 +301,4 @@ def test_dark_is_dark(open_window: Callable[..., Window], pictures: Path) -> Non
     window.act("set_theme", "dark")
     window.act("set_stage", "candidate")
     window.until(lambda: window.node("/first/segments")["colour"] == hexadecimal(PALETTES["dark"].first), "the colours")
-    window.page.screenshot(path=pictures / "scene-dark.png")
+    photograph(window.page, pictures / "scene-dark.png")
