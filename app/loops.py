@@ -10,7 +10,7 @@ from app.jobs import Check
 from app.kept import ResultStore
 from app.posegraph import Graph, PoseGraph, Solver, edge
 from app.searching import WORKERS, Found, LoopSearch, Searching, find_closures
-from segmap.errors import ProjectError
+from segmap.errors import ParameterError, ProjectError
 from segmap.graph import Preview
 from segmap.spreading import Told
 
@@ -67,7 +67,10 @@ class Loops:
         Raises:
             ProjectError: there are others, but not this one.
         """
-        match = self._session.match(integration, heuristic)
+        try:
+            match = self._session.match(integration, heuristic)
+        except ParameterError:  # the heuristic is one of a mode that was left meanwhile
+            return None
         if match is None or not match.ranked:
             return None
         if rank >= len(match.ranked):
